@@ -1,0 +1,211 @@
+"""ElbowArmEnv: one arm as a Gymnasium environment, the batch with a single arm."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import Any, cast
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from elbow_gym.episodes import Episodes
+from elbow_gym.parameters import ArmParameters, Array, non_negative
+from elbow_gym.settings import Settings
+
+
+def action_space(episodes: Episodes) -> spaces.Space[NDArray[np.float32]]:
+    """The action space of one arm."""
+    high = np.float32(episodes.highest_action)
+    return cast("spaces.Space[NDArray[np.float32]]", spaces.Box(-high, high, (episodes.arm.n_joints,), np.float32))
+
+
+def observation_space(episodes: Episodes) -> spaces.Space[NDArray[np.float32]]:
+    """The observation space of one arm."""
+    high = episodes.layout.high
+    return cast("spaces.Space[NDArray[np.float32]]", spaces.Box(-high, high, dtype=np.float32))
+
+
+def as_action(action: object, shape: tuple[int, ...]) -> Array:
+    """The action as float64. ValueError unless it is numbers of this shape."""
+    try:
+        array = np.asarray(action, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"action must be numbers of shape {shape}, got {action!r}") from error
+    if array.shape != shape:
+        raise ValueError(f"action must have shape {shape}, got {array.shape}")
+    return array
+
+
+class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
+    """A ten-joint arm with DC motors leans its elbows on a table and draws a circle; every joule is counted.
+
+    ## Description
+
+    The arm of the multi-point-elbow paper: joint 1 yaws, joints 2 to 10 pitch in the vertical plane that the yaw
+    selects, each driven by a DC servo motor through a gear. Up to several *elbows* (joints held at z = 0 by the
+    table) carry the arm's weight. The hand has to follow a circle; the price is electrical energy.
+
+    ## Action Space
+
+    A `Box(-1, 1, (n,), float32)`: each motor's terminal voltage as a fraction of the supply voltage, held for one
+    control period. With `action_unit="volt"` it is `Box(-V, V, (n,), float32)` in volts. Values outside act like
+    the nearest bound.
+
+    | Num | Action | Min | Max | Joint | Quantity (unit) |
+    |-----|--------|-----|-----|-------|-----------------|
+    | 0 | voltage of motor 1 over the supply voltage | -1 | 1 | 1 (yaw) | voltage (V) |
+    | 1..n-1 | voltage of motors 2..n over the supply voltage | -1 | 1 | 2..n (pitch) | voltage (V) |
+
+    ## Observation Space
+
+    A flat `Box` of float32. Each entry is a quantity over its scale, saturated at its limit; `observation_names`
+    lists the entries, `decode` turns them back into SI units.
+
+    | Name | Entries | Unit | Scale | Limit | Meaning |
+    |------|---------|------|-------|-------|---------|
+    | joint_angle | n | rad | 0.5 | 10 | joint angle minus the start pose's |
+    | joint_velocity | n | rad/s | 5 | 100 | joint velocity |
+    | current | n | A | 5 | 500 | armature current |
+    | hand_error | 3 | m | 0.1 | 10 | hand minus target, along x, y, z |
+    | hand_position | 3 | m | 0.1 | 10 | hand minus the circle's centre, along x, y, z |
+    | lookahead_error | 3 | m | 0.1 | 10 | hand minus the target 0.1 s later, along x, y, z |
+    | target_angle | 2 | - | 1 | 1 | cosine and sine of the target's angle on the circle |
+
+    ## Rewards
+
+    `-(tracking_weight * |hand - target| + energy_weight * P)` per control step: the distance [m] at the end of the
+    step, and the mean electrical power P [W] over it, so that by default one watt weighs as much as one millimetre.
+    The two terms are in `info` as `reward_tracking` and `reward_energy`.
+
+    ## Starting State
+
+    The paper's start pose (or, with `start="on_target"`, the pose with the hand on the circle) at rest without
+    current, plus normal noise of `start_noise` rad per joint, projected onto the elbows' plane.
+    `reset(options={"state": {"q": ..., "q_dot": ..., "current": ...}, "phase": ...})` sets it exactly.
+
+    ## Episode End
+
+    Truncated after `duration` seconds. Terminated only when the state leaves what float64 can represent; the
+    remaining time is then charged at the worst rate that the spaces' bounds allow.
+
+    ## Arguments
+
+    | Argument | Default | Meaning |
+    |----------|---------|---------|
+    | elbows | 2 | 0, 1, 2 as in the paper (joints (), (4,), (4, 7)), or a tuple of joint numbers |
+    | arm | "paper" | preset name, an `ArmParameters`, or its JSON dict |
+    | control_frequency | 50.0 | how often an action is read [Hz] |
+    | timestep | 0.002 | longest RK4 step [s] |
+    | duration | 5.0 | episode length [s] |
+    | voltage_limit | 24.0 | supply voltage of every motor [V] |
+    | action_unit | "fraction" | "fraction" of the supply voltage, or "volt" |
+    | start | "paper" | "paper" or "on_target" |
+    | start_noise | 0.02 | standard deviation of the start pose [rad] |
+    | circle | None | dict of center, radius, period, plane, phase, direction; phase may be "random" |
+    | tracking_weight | 1.0 | reward per metre of tracking error |
+    | energy_weight | 0.001 | reward per watt of electrical power |
+    | regeneration | True | whether negative electrical power is credited |
+
+    `info` holds tracking_error [m], electrical_power [W], electrical_energy, drawn_energy and link_work [J] since the
+    reset, reward_tracking, reward_energy, voltage [V], elbow_force [N] and below_table [s].
+
+    ## Version History
+
+    * v0: first version.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 50}
+
+    def __init__(
+        self,
+        *,
+        elbows: int | tuple[int, ...] = 2,
+        arm: str | ArmParameters | Mapping[str, Any] = "paper",
+        render_mode: str | None = None,
+        **settings: Any,
+    ) -> None:
+        if render_mode is not None:
+            raise ValueError(f"render_mode must be one of {self.metadata['render_modes']} or None, got {render_mode!r}")
+        self.render_mode = None
+        self._episodes = Episodes(Settings(elbows=elbows, arm=arm, **settings))
+        self.metadata = {**self.metadata, "render_fps": round(self.settings.control_frequency)}
+        self.action_space = action_space(self._episodes)
+        self.observation_space = observation_space(self._episodes)
+        self._ready = False
+
+    @property
+    def settings(self) -> Settings:
+        """The arguments that the environment was made with."""
+        return self._episodes.settings
+
+    @property
+    def episodes(self) -> Episodes:
+        """The batch of one arm that this environment runs."""
+        return self._episodes
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Name and unit of each entry of the observation."""
+        return self._episodes.layout.names
+
+    def decode(self, observation: NDArray[np.float32]) -> dict[str, Array]:
+        """The observation's quantities in SI units, by feature name."""
+        return self._episodes.layout.decode(observation)
+
+    def set_energy_weight(self, energy_weight: float) -> None:
+        """Changes the reward's price of power [1/W] from the next step on."""
+        self._episodes.energy_weight = non_negative("energy_weight", energy_weight)
+
+    def set_tracking_weight(self, tracking_weight: float) -> None:
+        """Changes the reward's price of tracking error [1/m] from the next step on."""
+        self._episodes.tracking_weight = non_negative("tracking_weight", tracking_weight)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Starts an episode. Raises ValueError naming a wrong option, with everything as it was."""
+        before = self._np_random, self._np_random_seed
+        super().reset(seed=seed)
+        try:
+            self._episodes.reset([self.np_random], options=options)
+        except ValueError:
+            self._np_random, self._np_random_seed = before
+            raise
+        self._ready = True
+        sight = self._episodes.look()
+        return sight.observation[0], single(self._episodes.info(sight))
+
+    def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """One control period. Raises ValueError, with the state untouched, on a wrong shape or NaN."""
+        if not self._ready:
+            raise gym.error.ResetNeeded("reset must be called before step")
+        array = as_action(action, (self._episodes.arm.n_joints,))
+        outcome = self._episodes.step(array[None])
+        return (
+            outcome.observation[0],
+            float(outcome.reward[0]),
+            bool(outcome.terminated[0]),
+            bool(outcome.truncated[0]),
+            single(outcome.info),
+        )
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that runs on, the random generator included."""
+        return {"episodes": self._episodes.get_state(), "generator": copy.deepcopy(self.np_random.bit_generator.state)}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Takes a state of `get_state`; the continued run is bit-identical."""
+        for name in ("episodes", "generator"):
+            if name not in state:
+                raise ValueError(f"state must have the entry {name!r}, got {sorted(state)}")
+        self._episodes.set_state(state["episodes"])
+        self.np_random.bit_generator.state = state["generator"]
+        self._ready = True
+
+
+def single(info: dict[str, Array]) -> dict[str, Any]:
+    """The info of the only arm: floats, and arrays of their own."""
+    return {key: float(rows[0]) if rows.ndim == 1 else rows[0] for key, rows in info.items()}

@@ -1,0 +1,268 @@
+"""What the arm is made of: motors, links and the serial chain of them."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MINIMUM_JOINTS = 3
+MAXIMUM_JOINTS = 64
+
+
+def _number(name: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise ValueError(f"{name} must be a number, got {value!r}")
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"{name} must be finite, got {value!r}")
+    return number
+
+
+def positive(name: str, value: object) -> float:
+    """The value as a float; ValueError naming `name` unless it is finite and above zero."""
+    number = _number(name, value)
+    if number <= 0.0:
+        raise ValueError(f"{name} must be positive, got {value!r}")
+    return number
+
+
+def non_negative(name: str, value: object) -> float:
+    """The value as a float; ValueError naming `name` unless it is finite and at least zero."""
+    number = _number(name, value)
+    if number < 0.0:
+        raise ValueError(f"{name} must not be negative, got {value!r}")
+    return number
+
+
+def _set(instance: object, name: str, value: object) -> None:
+    object.__setattr__(instance, name, value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotorParameters:
+    """A DC servo motor behind a gear (eqs 1-12). All positive, the friction also zero."""
+
+    armature_resistance: float = 1.1
+    """R [ohm]."""
+    armature_inductance: float = 0.0017
+    """L [H]."""
+    torque_constant: float = 0.203
+    """K [N m/A], equal to the back-EMF constant [V s/rad]."""
+    rotor_inertia: float = 0.000164
+    """I_m [kg m^2], at the motor shaft."""
+    gear_ratio: float = 3.0
+    """k [-], motor turns per joint turn."""
+    gear_viscous_friction: float = 0.01
+    """d_m [N m s/rad], at the motor shaft."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            check = non_negative if field.name == "gear_viscous_friction" else positive
+            _set(self, field.name, check(field.name, getattr(self, field.name)))
+
+    @property
+    def joint_torque_constant(self) -> float:
+        """K_m = K k [N m/A at the joint].   Eqs 9-12."""
+        return self.torque_constant * self.gear_ratio
+
+    @property
+    def reflected_inertia(self) -> float:
+        """J_m = I_m k^2 [kg m^2 at the joint].   Eq. 12."""
+        return self.rotor_inertia * self.gear_ratio**2
+
+    @property
+    def reflected_viscous_friction(self) -> float:
+        """D_m = d_m k^2 [N m s/rad at the joint].   Eq. 12."""
+        return self.gear_viscous_friction * self.gear_ratio**2
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkParameters:
+    """A uniform solid cylinder, its centre of mass in the middle."""
+
+    mass: float = 0.1
+    """m [kg]."""
+    length: float = 0.3
+    """l [m]; zero for link 1, which only carries the yaw."""
+    radius: float = 0.01
+    """r [m]."""
+
+    def __post_init__(self) -> None:
+        _set(self, "mass", positive("mass", self.mass))
+        _set(self, "length", non_negative("length", self.length))
+        _set(self, "radius", positive("radius", self.radius))
+
+    @property
+    def axial_inertia(self) -> float:
+        """I_s = m r^2 / 2 [kg m^2], about the cylinder's axis."""
+        return self.mass * self.radius**2 / 2.0
+
+    @property
+    def transverse_inertia(self) -> float:
+        """I_t = m (3 r^2 + l^2) / 12 [kg m^2], across the axis at the centre of mass."""
+        return self.mass * (3.0 * self.radius**2 + self.length**2) / 12.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmParameters:
+    """A serial arm: joint 1 yaws about world z, joints 2..n pitch about parallel horizontal axes.
+
+    All sequences have one entry per joint, joint 1 first. Raises ValueError naming the argument.
+    """
+
+    links: tuple[LinkParameters, ...]
+    """Link k runs from joint k to joint k + 1 (the last one to the hand)."""
+    motors: tuple[MotorParameters, ...]
+    """One motor per joint."""
+    joint_viscous_friction: tuple[float, ...]
+    """D [N m s/rad], one per joint."""
+    nominal_pose: tuple[float, ...]
+    """Joint angles [rad] of the start pose, which the PD also keeps on its idle joints."""
+    gravity: float = 9.81
+    """g [m/s^2], along -z."""
+
+    def __post_init__(self) -> None:
+        n = len(self.links)
+        if not MINIMUM_JOINTS <= n <= MAXIMUM_JOINTS:
+            raise ValueError(f"links must have {MINIMUM_JOINTS} to {MAXIMUM_JOINTS} entries, got {n}")
+        for name in ("motors", "joint_viscous_friction", "nominal_pose"):
+            if len(getattr(self, name)) != n:
+                raise ValueError(f"{name} must have one entry per link ({n}), got {len(getattr(self, name))}")
+        for name, kind in (("links", LinkParameters), ("motors", MotorParameters)):
+            for k, part in enumerate(getattr(self, name), start=1):
+                if not isinstance(part, kind):
+                    raise ValueError(f"{name}[{k}] must be {kind.__name__}, got {part!r}")
+        for k, link in enumerate(self.links, start=1):
+            if k == 1 and link.length != 0.0:
+                raise ValueError(f"length of link 1 must be zero (it only yaws), got {link.length}")
+            if k > 1:
+                positive(f"length of link {k}", link.length)
+        friction = tuple(
+            non_negative(f"joint_viscous_friction[{k}]", value)
+            for k, value in enumerate(self.joint_viscous_friction, start=1)
+        )
+        pose = tuple(_number(f"nominal_pose[{k}]", value) for k, value in enumerate(self.nominal_pose, start=1))
+        _set(self, "joint_viscous_friction", friction)
+        _set(self, "nominal_pose", pose)
+        _set(self, "gravity", non_negative("gravity", self.gravity))
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints, links and motors."""
+        return len(self.links)
+
+    def of_links(self, name: str) -> Array:
+        """A link quantity by its attribute name, shape (n,)."""
+        return np.array([getattr(link, name) for link in self.links])
+
+    def of_motors(self, name: str) -> Array:
+        """A motor quantity by its attribute name, shape (n,)."""
+        return np.array([getattr(motor, name) for motor in self.motors])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON types, the inverse of `from_dict`."""
+        plain = asdict(self)
+        return {
+            key: list(cast("tuple[Any, ...]", value)) if isinstance(value, tuple) else value
+            for key, value in plain.items()
+        }
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> ArmParameters:
+        """The arm of `to_dict`. Raises ValueError naming an unknown, missing or wrong entry."""
+        allowed = {field.name for field in fields(cls)}
+        _only(plain, allowed, "arm")
+        missing = sorted(allowed - {"gravity"} - set(plain))
+        if missing:
+            raise ValueError(f"arm must have the entry {missing[0]!r}, got {sorted(plain)}")
+        values = dict(plain)
+        values["links"] = tuple(_part(LinkParameters, part, "links") for part in _sequence("links", plain["links"]))
+        values["motors"] = tuple(
+            _part(MotorParameters, part, "motors") for part in _sequence("motors", plain["motors"])
+        )
+        for name in ("joint_viscous_friction", "nominal_pose"):
+            values[name] = tuple(_sequence(name, plain[name]))
+        return cls(**values)
+
+
+def _sequence(name: str, value: object) -> Sequence[Any]:
+    if not isinstance(value, list | tuple):
+        raise ValueError(f"{name} must be a list, got {value!r}")
+    return cast("Sequence[Any]", value)
+
+
+def _only(plain: Mapping[str, Any], allowed: set[str], owner: str) -> None:
+    unknown = sorted(set(plain) - allowed)
+    if unknown:
+        raise ValueError(f"{owner} must have only the entries {sorted(allowed)}, got {unknown[0]!r}")
+
+
+def _part(kind: type[Any], plain: object, owner: str) -> Any:
+    if not isinstance(plain, Mapping):
+        raise ValueError(f"{owner} must hold dicts of {kind.__name__}, got {plain!r}")
+    mapping = cast("Mapping[str, Any]", plain)
+    _only(mapping, {field.name for field in fields(kind)}, owner)
+    return kind(**mapping)
+
+
+def paper_arm() -> ArmParameters:
+    """The paper's arm: ten joints, its motors, links and start pose (section 4 of the paper)."""
+    turns = (0.0, 0.25, 0.5, -0.5, 0.25, 0.25, -0.5, 0.25, -0.25, 0.25)
+    n = len(turns)
+    return ArmParameters(
+        links=(LinkParameters(length=0.0), *(LinkParameters() for _ in range(n - 1))),
+        motors=tuple(MotorParameters() for _ in range(n)),
+        joint_viscous_friction=(0.5,) * n,
+        nominal_pose=tuple(turn * math.pi for turn in turns),
+    )
+
+
+PRESETS = {"paper": paper_arm}
+
+
+def as_arm(arm: object) -> ArmParameters:
+    """An arm from a preset name, a dict of `ArmParameters.to_dict`, or an ArmParameters."""
+    if isinstance(arm, ArmParameters):
+        return arm
+    if isinstance(arm, str):
+        if arm not in PRESETS:
+            raise ValueError(f"arm must be one of {sorted(PRESETS)}, got {arm!r}")
+        return PRESETS[arm]()
+    if isinstance(arm, Mapping):
+        return ArmParameters.from_dict(cast("Mapping[str, Any]", arm))
+    raise ValueError(f"arm must be a preset name, a dict or ArmParameters, got {arm!r}")
+
+
+def as_elbows(elbows: object, n_joints: int) -> tuple[int, ...]:
+    """Elbow joint numbers from 0, 1, 2 (the paper's (), (4,), (4, 7)) or a sequence of joint numbers.
+
+    Joint 3 is the first that can move off the table. Sorted; ValueError otherwise.
+    """
+    if isinstance(elbows, numbers.Integral) and not isinstance(elbows, bool):
+        paper = {0: (), 1: (4,), 2: (4, 7)}
+        if int(elbows) not in paper:
+            raise ValueError(f"elbows must be 0, 1, 2 or a tuple of joint numbers, got {elbows!r}")
+        joints = paper[int(elbows)]
+    elif isinstance(elbows, list | tuple | np.ndarray):
+        listed = cast("Sequence[object]", elbows)
+        if not all(isinstance(e, numbers.Integral) and not isinstance(e, bool) for e in listed):
+            raise ValueError(f"elbows must be joint numbers (integers), got {elbows!r}")
+        joints = tuple(sorted(int(cast("int", e)) for e in listed))
+    else:
+        raise ValueError(f"elbows must be 0, 1, 2 or a tuple of joint numbers, got {elbows!r}")
+    for joint in joints:
+        if not 3 <= joint <= n_joints:
+            raise ValueError(
+                f"elbows must be joints 3 to {n_joints} (joints 1 and 2 sit on the base), got {joint} in {elbows!r}"
+            )
+    if len(set(joints)) != len(joints):
+        raise ValueError(f"elbows must not repeat a joint, got {elbows!r}")
+    return joints

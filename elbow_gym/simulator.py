@@ -1,0 +1,306 @@
+"""A batch of arms in time: the only place where public (B, n) arrays meet the compiled kernel."""
+
+from __future__ import annotations
+
+import itertools
+import numbers
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from elbow_gym import kernel
+from elbow_gym.kinematics import constraint_jacobian, elbow_heights
+from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows, positive
+
+# Explicit RK4 is stable up to 2.785 / rate; the fastest rate of this family is the armature's R / L.
+STABILITY_LIMIT = 2.7
+# A given state may be off the elbows' plane by this much [m, m/s].
+PLANE_TOLERANCE = 1e-8
+# Newton steps onto the plane; a fixed number, so that an arm's bits do not depend on its neighbours.
+SETTLING_STEPS = 30
+
+
+def parameter_table(arm: ArmParameters, payload: float = 0.0) -> Array:
+    """The kernel's parameter rows of one arm, shape (PARAMETER_ROWS, n)."""
+    one = np.ones(arm.n_joints)
+    mass, length = arm.of_links("mass"), arm.of_links("length")
+    transverse, axial = arm.of_links("transverse_inertia"), arm.of_links("axial_inertia")
+    motor_friction = arm.of_motors("reflected_viscous_friction")
+    rows = {
+        "length": length,
+        "mass": mass,
+        "end_inertia": transverse + mass * length**2 / 4.0,
+        "inertia_difference": transverse - axial,
+        "axial_inertia": axial,
+        "reflected_inertia": arm.of_motors("reflected_inertia"),
+        "joint_torque_constant": arm.of_motors("joint_torque_constant"),
+        "friction": np.array(arm.joint_viscous_friction) + motor_friction,
+        "reflected_viscous_friction": motor_friction,
+        "armature_resistance": arm.of_motors("armature_resistance"),
+        "inverse_inductance": 1.0 / arm.of_motors("armature_inductance"),
+        "gravity": arm.gravity * one,
+        "payload": payload * one,
+    }
+    return np.stack([rows[name] for name in kernel.PARAMETERS])
+
+
+def _batch(name: str, value: ArrayLike, shape: tuple[int, int]) -> Array:
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape not in (shape, shape[1:]):
+        raise ValueError(f"{name} must have shape {shape} or {shape[1:]}, got {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
+    return np.broadcast_to(array, shape)
+
+
+class Simulator:
+    """B arms side by side under piecewise constant voltages, by RK4 with the energies integrated alongside.
+
+    Args:
+        arm: an ArmParameters or a preset name.
+        elbows: 0, 1, 2 as in the paper, or joint numbers held at z = 0.
+        num_envs: B, the number of arms.
+        timestep: RK4 step [s], below 2.7 times the smallest L / R.
+        num_threads: threads over which blocks of arms are spread; the results do not depend on it.
+
+    Arrays are (B, n), elbow forces (B, p), positions (B, 3); those returned by properties are read-only views of
+    the running state. Raises ValueError naming the argument.
+    """
+
+    def __init__(
+        self,
+        arm: ArmParameters | str | Mapping[str, Any] = "paper",
+        elbows: int | tuple[int, ...] = 2,
+        num_envs: int = 1,
+        *,
+        timestep: float = 0.002,
+        num_threads: int = 1,
+    ) -> None:
+        self.arm = as_arm(arm)
+        self.elbows = as_elbows(elbows, self.arm.n_joints)
+        if len(self.elbows) > kernel.MAXIMUM_ELBOWS:
+            raise ValueError(f"elbows must be at most {kernel.MAXIMUM_ELBOWS}, got {len(self.elbows)}")
+        for name, count in (("num_envs", num_envs), ("num_threads", num_threads)):
+            if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 1:
+                raise ValueError(f"{name} must be a positive integer, got {count!r}")
+        self.num_envs = int(num_envs)
+        self.timestep = positive("timestep", timestep)
+        limit = STABILITY_LIMIT * float(
+            (self.arm.of_motors("armature_inductance") / self.arm.of_motors("armature_resistance")).min()
+        )
+        if self.timestep > limit:
+            raise ValueError(f"timestep must be at most {limit:.3g} s (RK4's limit for L / R), got {timestep}")
+        n = self.arm.n_joints
+        self._elbow_index = np.array(self.elbows, dtype=np.int64)
+        self._state = np.zeros((self.num_envs, kernel.STATE_ROWS, n))
+        self._summary = np.zeros((self.num_envs, kernel.SUMMARY_COLUMNS + len(self.elbows)))
+        self._parameters = np.repeat(parameter_table(self.arm)[None], self.num_envs, axis=0)
+        self._steps = np.zeros(self.num_envs, dtype=np.int64)
+        # Up to two arms the lanes of a block would mostly idle.
+        lanes = 1 if self.num_envs <= 2 else kernel.BLOCK_LANES
+        self._advance, _, self._settle = kernel.kernel(lanes)
+        blocks = -(-self.num_envs // lanes)
+        edges = np.linspace(0, blocks, min(int(num_threads), blocks) + 1).round().astype(int) * lanes
+        self._shares = [(int(a), min(int(b), self.num_envs)) for a, b in itertools.pairwise(edges)]
+        self._pool = ThreadPoolExecutor(len(self._shares)) if len(self._shares) > 1 else None
+
+    def reset(
+        self,
+        q: ArrayLike | None = None,
+        q_dot: ArrayLike | None = None,
+        current: ArrayLike | None = None,
+        mask: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Sets state and zeroes clocks and meters of all arms, or of those in `mask` (B,).
+
+        Args:
+            q: relative angles [rad], (B, n) or (n,), elbows at z = 0 to 1e-8 m (`on_table` helps);
+                the arm's nominal pose when None.
+            q_dot: rates [rad/s] that keep the elbows on the table to 1e-8 m/s; zero when None.
+            current: armature currents [A]; zero when None.
+            mask: which arms, shape (B,); all when None.
+        """
+        q, q_dot, current, chosen = self.check_state(q, q_dot, current, mask)
+        self._state[chosen] = 0.0
+        self._state[chosen, 0] = q[chosen]
+        self._state[chosen, 1] = q_dot[chosen]
+        self._state[chosen, 2] = current[chosen]
+        self._summary[chosen] = 0.0
+        self._steps[chosen] = 0
+        self._run(np.zeros_like(q), 0)
+
+    def on_table(self, q: ArrayLike) -> Array:
+        """The nearest poses (least change of absolute pitch) with every elbow at z = 0 [rad], (B, n).
+
+        Raises ValueError when there is no such pose near one of `q`, (B, n) or (n,).
+        """
+        settled = _batch("q", q, (self.num_envs, self.arm.n_joints)).copy()
+        if self.elbows:
+            self._settle(settled, self._parameters, self._elbow_index, SETTLING_STEPS)
+            if not (np.abs(settled).max() < kernel.LARGEST_ANGLE):
+                raise ValueError(f"q must be near a pose with the elbows {self.elbows} at z = 0, got {q!r}")
+            self._check_on_table(settled, np.zeros_like(settled))
+        return settled
+
+    def check_state(
+        self,
+        q: ArrayLike | None = None,
+        q_dot: ArrayLike | None = None,
+        current: ArrayLike | None = None,
+        mask: NDArray[np.bool_] | None = None,
+    ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+        """The arguments of `reset` as full arrays. Raises its ValueErrors and changes nothing."""
+        n = self.arm.n_joints
+        shape = (self.num_envs, n)
+        q = _batch("q", self.arm.nominal_pose if q is None else q, shape)
+        q_dot = _batch("q_dot", np.zeros(n) if q_dot is None else q_dot, shape)
+        current = _batch("current", np.zeros(n) if current is None else current, shape)
+        chosen = np.ones(self.num_envs, dtype=np.bool_) if mask is None else np.asarray(mask, dtype=np.bool_)
+        if chosen.shape != (self.num_envs,):
+            raise ValueError(f"mask must have shape {(self.num_envs,)}, got {chosen.shape}")
+        if self.elbows:
+            self._check_on_table(q[chosen], q_dot[chosen])
+        return q, q_dot, current, chosen
+
+    def _check_on_table(self, q: Array, q_dot: Array) -> None:
+        height = np.abs(elbow_heights(self.arm, q, self.elbows))
+        if height.size and height.max() > PLANE_TOLERANCE:
+            joint = self.elbows[int(height.max(axis=0).argmax())]
+            raise ValueError(
+                f"q must hold elbow joint {joint} at z = 0 to {PLANE_TOLERANCE:g} m, got {height.max():.6g} m off"
+            )
+        for pose, rate in zip(q, q_dot, strict=True):
+            if rate.any():
+                speed = np.abs(constraint_jacobian(self.arm, pose, self.elbows) @ rate).max()
+                if speed > PLANE_TOLERANCE:
+                    raise ValueError(f"q_dot must keep the elbows at z = 0, got {speed:.6g} m/s off the table")
+
+    def step(self, voltage: ArrayLike, n_substeps: int = 1) -> None:
+        """Advances every arm by n_substeps timesteps under constant terminal voltages [V], (B, n) or (n,).
+
+        An arm whose state leaves what float64 can represent keeps its last state and shows in `valid`.
+        Raises ValueError, with the state untouched, on a wrong shape, a non-finite voltage or n_substeps < 1.
+        """
+        voltage = _batch("voltage", voltage, (self.num_envs, self.arm.n_joints))
+        if isinstance(n_substeps, bool) or not isinstance(n_substeps, numbers.Integral) or n_substeps < 1:
+            raise ValueError(f"n_substeps must be a positive integer, got {n_substeps!r}")
+        self.advance(np.ascontiguousarray(voltage), int(n_substeps))
+
+    def advance(self, voltage: Array, n_substeps: int) -> None:
+        """`step` without its checks, for callers that made them: a contiguous float64 (B, n) of finite volts."""
+        self._run(voltage, n_substeps)
+        self._steps += n_substeps
+
+    @property
+    def raw(self) -> tuple[Array, Array]:
+        """The kernel's own state and summary arrays, for functions that only read them."""
+        return self._state, self._summary
+
+    def _run(self, voltage: Array, n_substeps: int) -> None:
+        fixed = (self._state, self._parameters, voltage, self._elbow_index)
+        moving = (n_substeps, self.timestep, self._summary)
+        if self._pool is None:
+            self._advance(*fixed, *self._shares[0], *moving)
+        else:
+
+            def run(share: tuple[int, int]) -> None:
+                self._advance(*fixed, *share, *moving)
+
+            list(self._pool.map(run, self._shares))
+
+    def get_state(self) -> dict[str, NDArray[Any]]:
+        """A copy of everything that runs on; `set_state` continues from it bit for bit."""
+        return {"state": self._state.copy(), "summary": self._summary.copy(), "steps": self._steps.copy()}
+
+    def set_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Takes a state of `get_state` from a simulator of the same size."""
+        own = {"state": self._state, "summary": self._summary, "steps": self._steps}
+        for name, array in own.items():
+            if name not in state or np.shape(state[name]) != array.shape:
+                got = np.shape(state[name]) if name in state else "nothing"
+                raise ValueError(f"state[{name!r}] must have shape {array.shape}, got {got}")
+        for name, array in own.items():
+            array[...] = state[name]
+
+    def _row(self, row: int) -> Array:
+        view = self._state[:, row]
+        view.flags.writeable = False
+        return view
+
+    def _columns(self, first: int, end: int | None) -> Array:
+        view = self._summary[:, first:end]
+        view.flags.writeable = False
+        return view
+
+    @property
+    def q(self) -> Array:
+        """Relative joint angles [rad], (B, n)."""
+        return self._row(0)
+
+    @property
+    def q_dot(self) -> Array:
+        """Joint rates [rad/s], (B, n)."""
+        return self._row(1)
+
+    @property
+    def current(self) -> Array:
+        """Armature currents [A], (B, n)."""
+        return self._row(2)
+
+    @property
+    def electrical_energy(self) -> Array:
+        """Integral of v i since the reset [J], (B, n); signed, regeneration counts back."""
+        return self._row(3)
+
+    @property
+    def drawn_energy(self) -> Array:
+        """Integral of max(v i, 0) since the reset [J], (B, n)."""
+        return self._row(4)
+
+    @property
+    def copper_loss(self) -> Array:
+        """Integral of R i^2 since the reset [J], (B, n)."""
+        return self._row(5)
+
+    @property
+    def friction_loss(self) -> Array:
+        """Integral of (D + D_m) q_dot^2 since the reset [J], (B, n)."""
+        return self._row(6)
+
+    @property
+    def link_work(self) -> Array:
+        """Integral of tau q_dot since the reset [J], (B, n), tau from eq. 12."""
+        return self._row(7)
+
+    @property
+    def hand_position(self) -> Array:
+        """Hand position [m], (B, 3), in world x, y, z."""
+        return self._columns(kernel.HAND, kernel.HAND + 3)
+
+    @property
+    def lowest_height(self) -> Array:
+        """Height of the lowest of joints 3..n and the hand [m], (B,)."""
+        return self._columns(kernel.LOWEST, kernel.LOWEST + 1)[:, 0]
+
+    @property
+    def below_table(self) -> Array:
+        """Time since the reset with a joint or the hand more than 1e-6 m under z = 0 [s], (B,)."""
+        return self._columns(kernel.BELOW_TABLE, kernel.BELOW_TABLE + 1)[:, 0]
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """False where the last step left what float64 can represent (the state is then the one before), (B,)."""
+        return self._summary[:, kernel.VALID] > 0.0
+
+    @property
+    def elbow_force(self) -> Array:
+        """f_n of the table on each elbow along +z [N], (B, p); negative when the table pulls."""
+        return self._columns(kernel.SUMMARY_COLUMNS, None)
+
+    @property
+    def time(self) -> Array:
+        """Time since the reset [s], (B,)."""
+        return np.asarray(self._steps * self.timestep, dtype=np.float64)

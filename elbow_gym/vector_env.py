@@ -1,0 +1,230 @@
+"""ElbowArmVectorEnv: B arms in one compiled call, as a Gymnasium vector environment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from elbow_gym.env import ElbowArmEnv, action_space, as_action, observation_space
+from elbow_gym.episodes import Episodes
+from elbow_gym.parameters import ArmParameters, Array, non_negative
+from elbow_gym.settings import Settings
+
+Flags = NDArray[np.bool_]
+
+
+class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+    """`ElbowArmEnv` for `num_envs` arms at once; arm i equals a single environment seeded `seed + i`, bit for bit.
+
+    Takes the arguments of `ElbowArmEnv` and
+
+    Args:
+        num_envs: the number of arms.
+        autoreset_mode: "NextStep", "SameStep" or "Disabled" (then reset with `options={"reset_mask": ...}`).
+        num_threads: threads over which blocks of arms are spread; the results do not depend on it.
+    """
+
+    metadata: dict[str, Any] = {**ElbowArmEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        elbows: int | tuple[int, ...] = 2,
+        arm: str | ArmParameters | Mapping[str, Any] = "paper",
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        num_threads: int = 1,
+        render_mode: str | None = None,
+        **settings: Any,
+    ) -> None:
+        if render_mode is not None:
+            raise ValueError(f"render_mode must be one of {self.metadata['render_modes']} or None, got {render_mode!r}")
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self._episodes = Episodes(Settings(elbows=elbows, arm=arm, **settings), num_envs, num_threads)
+        self.num_envs = num_envs
+        self.render_mode = None
+        self.metadata = {
+            **self.metadata,
+            "autoreset_mode": self.autoreset_mode,
+            "render_fps": round(self.settings.control_frequency),
+        }
+        self.single_action_space = action_space(self._episodes)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.single_observation_space = observation_space(self._episodes)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._generators: list[np.random.Generator] = []
+        self._seeds: list[int] = []
+        self._over = np.zeros(num_envs, dtype=np.bool_)
+
+    @property
+    def settings(self) -> Settings:
+        """The arguments that the environment was made with."""
+        return self._episodes.settings
+
+    @property
+    def episodes(self) -> Episodes:
+        """The batch of arms that this environment runs."""
+        return self._episodes
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Name and unit of each entry of an arm's observation."""
+        return self._episodes.layout.names
+
+    @property
+    def np_random(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self,
+    ) -> tuple[np.random.Generator, ...]:
+        """One generator per arm."""
+        self._seed(None, np.ones(self.num_envs, dtype=np.bool_))
+        return tuple(self._generators)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """One seed per arm."""
+        self._seed(None, np.ones(self.num_envs, dtype=np.bool_))
+        return tuple(self._seeds)
+
+    def decode(self, observation: NDArray[np.float32]) -> dict[str, Array]:
+        """The observations' quantities in SI units, by feature name, each (B, size)."""
+        return self._episodes.layout.decode(observation)
+
+    def set_energy_weight(self, energy_weight: float) -> None:
+        """Changes the reward's price of power [1/W] from the next step on."""
+        self._episodes.energy_weight = non_negative("energy_weight", energy_weight)
+
+    def set_tracking_weight(self, tracking_weight: float) -> None:
+        """Changes the reward's price of tracking error [1/m] from the next step on."""
+        self._episodes.tracking_weight = non_negative("tracking_weight", tracking_weight)
+
+    def _seed(self, seed: int | Sequence[int | None] | None, chosen: Flags) -> None:
+        if not self._generators:
+            drawn = [seeding.np_random() for _ in range(self.num_envs)]
+            self._generators, self._seeds = [pair[0] for pair in drawn], [pair[1] for pair in drawn]
+        if seed is None:
+            return
+        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else list(seed)
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed must be an integer or one per arm ({self.num_envs}), got {len(seeds)}")
+        for i in np.flatnonzero(chosen):
+            if seeds[i] is not None:
+                self._generators[i], self._seeds[i] = seeding.np_random(seeds[i])
+
+    def _reset_mask(self, options: Mapping[str, Any]) -> Flags:
+        given = options.get("reset_mask")
+        if given is None:
+            return np.ones(self.num_envs, dtype=np.bool_)
+        mask: NDArray[Any] = np.asarray(given)
+        if mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            raise ValueError(f"options['reset_mask'] must be a bool array of shape {(self.num_envs,)}, got {given!r}")
+        if not mask.any():
+            raise ValueError(f"options['reset_mask'] must choose at least one arm, got {given!r}")
+        return mask
+
+    def reset(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Starts episodes in all arms, or in those of `options["reset_mask"]`. The other options are `ElbowArmEnv`'s.
+
+        Raises ValueError naming a wrong option, with everything as it was.
+        """
+        options = {} if options is None else options
+        chosen = self._reset_mask(options)
+        before = list(self._generators), list(self._seeds)
+        try:
+            self._seed(seed, chosen)
+            rest = {key: value for key, value in options.items() if key != "reset_mask"}
+            self._episodes.reset(self._generators, chosen, rest)
+        except ValueError:
+            self._generators, self._seeds = before
+            raise
+        self._over[chosen] = False
+        sight = self._episodes.look()
+        return sight.observation, masked(self._episodes.info(sight), chosen)
+
+    def step(
+        self, actions: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
+        """One control period of every arm. Raises ValueError, with the state untouched, on a wrong shape or NaN."""
+        if not self._generators:
+            raise gym.error.ResetNeeded("reset must be called before step")
+        array = as_action(actions, (self.num_envs, self._episodes.arm.n_joints))
+        waiting = self._over
+        if self.autoreset_mode is AutoresetMode.DISABLED and waiting.any():
+            raise gym.error.ResetNeeded(
+                f"reset must be called with options['reset_mask'] for arms that are over, got {np.flatnonzero(waiting)}"
+            )
+        outcome = self._episodes.step(array)
+        over = outcome.terminated | outcome.truncated
+        if not over.any() and not waiting.any():
+            everyone = np.ones(self.num_envs, dtype=np.bool_)
+            return (*outcome[:4], masked(outcome.info, everyone))
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            return self._same_step(outcome, over)
+        if waiting.any():
+            # Arms that ended a step ago start anew instead; what they did meanwhile does not count.
+            self._episodes.reset(self._generators, waiting)
+            sight = self._episodes.look()
+            info = self._episodes.info(sight)
+            outcome.observation[waiting] = sight.observation[waiting]
+            for array in (outcome.reward, outcome.terminated, outcome.truncated):
+                array[waiting] = 0
+            for key, rows in outcome.info.items():
+                rows[waiting] = info[key][waiting]
+        self._over = outcome.terminated | outcome.truncated
+        return (*outcome[:4], masked(outcome.info, np.ones(self.num_envs, dtype=np.bool_)))
+
+    def _same_step(self, outcome: Any, over: Flags) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        final_obs = np.full(self.num_envs, None, dtype=object)
+        for i in np.flatnonzero(over):
+            final_obs[i] = outcome.observation[i].copy()
+        self._episodes.reset(self._generators, over)
+        sight = self._episodes.look()
+        info = self._episodes.info(sight)
+        outcome.observation[over] = sight.observation[over]
+        final_info = {key: np.where(spread(over, rows), rows, 0.0) for key, rows in outcome.info.items()}
+        for key, rows in outcome.info.items():
+            rows[over] = info[key][over]
+        infos = masked(outcome.info, np.ones(self.num_envs, dtype=np.bool_))
+        infos.update(final_obs=final_obs, _final_obs=over.copy(), final_info=masked(final_info, over))
+        infos["_final_info"] = over.copy()
+        return (*outcome[:4], infos)
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that runs on, the random generators included."""
+        return {
+            "episodes": self._episodes.get_state(),
+            "generators": [generator.bit_generator.state for generator in self.np_random],
+            "over": self._over.copy(),
+        }
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Takes a state of `get_state`; the continued run is bit-identical."""
+        for name in ("episodes", "generators", "over"):
+            if name not in state:
+                raise ValueError(f"state must have the entry {name!r}, got {sorted(state)}")
+        if len(state["generators"]) != self.num_envs:
+            raise ValueError(f"state['generators'] must have {self.num_envs} entries, got {len(state['generators'])}")
+        self._episodes.set_state(state["episodes"])
+        for generator, saved in zip(self.np_random, state["generators"], strict=True):
+            generator.bit_generator.state = saved
+        self._over = np.array(state["over"], dtype=np.bool_)
+
+
+def spread(mask: Flags, rows: Array) -> Flags:
+    """The mask (B,) with trailing axes, so that it broadcasts against rows (B, ...)."""
+    return mask.reshape(-1, *([1] * (rows.ndim - 1)))
+
+
+def masked(info: dict[str, Array], mask: Flags) -> dict[str, Any]:
+    """Gymnasium's vector info: each key beside its `_key` mask of the arms that have it."""
+    full: dict[str, Any] = dict(info)
+    full.update({f"_{key}": mask.copy() for key in info})
+    return full
