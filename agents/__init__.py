@@ -1,0 +1,1 @@
+"""Controllers, training, evaluation and the reproduction of the paper: `python -m agents`."""

@@ -157,5 +157,5 @@ def forward_dynamics(
             voltage - arm.of_motors("armature_resistance") * current - back_emf(arm, q_dot),
         ]
     )
-    solution: Array = np.linalg.solve(matrix, right)
+    solution = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
     return Acceleration(solution[:n], solution[n : n + p], solution[n + p :])

@@ -115,7 +115,7 @@ class Episodes:
         if self.settings.start == "on_target":
             q[chosen] = self._on_target(phase)
         if noise > 0.0:
-            q[chosen] += noise * np.array([generator.standard_normal(q.shape[1]) for generator in generators])
+            q[chosen] += noise * np.stack([generator.standard_normal(self.arm.n_joints) for generator in generators])
             q = self.simulator.on_table(q)
         return q
 

@@ -170,10 +170,8 @@ class ArmParameters:
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON types, the inverse of `from_dict`."""
         plain = asdict(self)
-        return {
-            key: list(cast("tuple[Any, ...]", value)) if isinstance(value, tuple) else value
-            for key, value in plain.items()
-        }
+        plain.update({key: list(value) for key, value in plain.items() if key != "gravity"})
+        return plain
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> ArmParameters:
