@@ -69,9 +69,9 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | joint_angle | n | rad | 0.5 | 10 | joint angle minus the start pose's |
     | joint_velocity | n | rad/s | 5 | 100 | joint velocity |
     | current | n | A | 5 | 500 | armature current |
-    | hand_error | 3 | m | 0.1 | 10 | hand minus target, along x, y, z |
-    | hand_position | 3 | m | 0.1 | 10 | hand minus the circle's centre, along x, y, z |
-    | lookahead_error | 3 | m | 0.1 | 10 | hand minus the target 0.1 s later, along x, y, z |
+    | hand_error | 3 | m | 0.5 | 10 | hand minus target, along x, y, z |
+    | hand_position | 3 | m | 0.5 | 10 | hand minus the circle's centre, along x, y, z |
+    | lookahead_error | 3 | m | 0.5 | 10 | hand minus the target 0.1 s later, along x, y, z |
     | target_angle | 2 | - | 1 | 1 | cosine and sine of the target's angle on the circle |
 
     ## Rewards

@@ -71,6 +71,15 @@ class Episodes:
         """Largest entry of an action, in the action's unit."""
         return self._highest
 
+    @property
+    def volts_per_action(self) -> float:
+        """Terminal voltage per unit of action [V]."""
+        return self._volts
+
+    def target(self) -> Array:
+        """The targets' positions now [m], (B, 3)."""
+        return self.circle.position(self.angle())
+
     def _on_target(self, angle: Array) -> Array:
         return inverse_kinematics(self.arm, self.pose, self.circle.position(angle))[0]
 

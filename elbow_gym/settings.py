@@ -93,7 +93,7 @@ class Settings:
         """Control periods in an episode."""
         return round(self.duration * self.control_frequency)
 
-    @classmethod
-    def names(cls) -> tuple[str, ...]:
-        """The arguments' names."""
-        return tuple(field.name for field in fields(cls))
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The arguments by name, as they were given."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}

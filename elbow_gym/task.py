@@ -34,9 +34,9 @@ FEATURES = (
     Feature("joint_angle", "rad", 0.5, 10.0, "joint angle minus the start pose's"),
     Feature("joint_velocity", "rad/s", 5.0, 100.0, "joint velocity"),
     Feature("current", "A", 5.0, 500.0, "armature current"),
-    Feature("hand_error", "m", 0.1, 10.0, "hand minus target, along x, y, z"),
-    Feature("hand_position", "m", 0.1, 10.0, "hand minus the circle's centre, along x, y, z"),
-    Feature("lookahead_error", "m", 0.1, 10.0, "hand minus the target 0.1 s later, along x, y, z"),
+    Feature("hand_error", "m", 0.5, 10.0, "hand minus target, along x, y, z"),
+    Feature("hand_position", "m", 0.5, 10.0, "hand minus the circle's centre, along x, y, z"),
+    Feature("lookahead_error", "m", 0.5, 10.0, "hand minus the target 0.1 s later, along x, y, z"),
     Feature("target_angle", "-", 1.0, 1.0, "cosine and sine of the target's angle on the circle"),
 )
 

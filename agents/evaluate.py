@@ -1,0 +1,95 @@
+"""Plays one controller in all regimes and says what it cost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.controller import Controller
+from agents.metrics import REGIMES, UNITS, joint_energies, metrics
+from agents.pd import PDController
+from agents.policy import Policy, load_policy
+from agents.recording import record
+from elbow_gym.settings import Settings
+from elbow_gym.vector_env import ElbowArmVectorEnv
+
+BENCHMARK_SEEDS = tuple(range(20_000, 20_020))
+"""Fixed and public; no training and no choice of a policy uses them."""
+
+Results = dict[str, dict[str, NDArray[np.float64]]]
+
+
+def in_all_regimes(
+    settings: Settings,
+    make_controller: Callable[[ElbowArmVectorEnv], Controller],
+    seeds: Sequence[int] = BENCHMARK_SEEDS,
+    progress: Callable[[int, int], None] | None = None,
+) -> Results:
+    """Metrics of every episode (S,) by regime and name; `joint_energy` beside them is (S, n).
+
+    Regimes with the same start share one run.
+    """
+    results: Results = {}
+    recordings = {}
+    for regime in REGIMES:
+        if regime.start not in recordings:
+            started = replace(settings, start=regime.start)
+            recordings[regime.start] = record(started, make_controller, seeds, progress)
+        recording = recordings[regime.start]
+        results[regime.name] = metrics(recording, regime.since)
+        results[regime.name]["joint_energy"] = joint_energies(recording, regime.since)
+    return results
+
+
+def named_controller(
+    name: str, elbows: int | None, action_unit: str = "fraction"
+) -> tuple[Settings, Callable[[ElbowArmVectorEnv], Controller]]:
+    """The environment and the maker of a controller by its name.
+
+    Names: "pd" (the paper's, clipped to 24 V, read at 2 kHz), "pd_paper" (unlimited, 10 kHz), an algorithm whose policy
+    is shipped ("ppo"), or the path of a policy.
+    """
+    count = 2 if elbows is None else elbows
+    if name == "pd_paper":
+        # The unclipped PD peaks at 377 V; the limit only has to stay out of its way.
+        settings = Settings(
+            elbows=count, control_frequency=1e4, timestep=1e-4, voltage_limit=1000.0, action_unit="volt"
+        )
+        return settings, PDController
+    if name == "pd":
+        return Settings(elbows=count, control_frequency=2e3, timestep=5e-4, action_unit=action_unit), PDController
+    is_path = Path(name).with_suffix(".json").is_file()
+    policy = load_policy(name) if is_path else load_policy(name, elbows=count)
+    if elbows is not None and policy.settings.elbows != elbows:
+        raise ValueError(f"elbows must be {policy.settings.elbows} as in the policy's training, got {elbows}")
+    return policy.settings, policy_maker(policy)
+
+
+def policy_maker(policy: Policy) -> Callable[[ElbowArmVectorEnv], Controller]:
+    """Gives the policy for environments that it was made for, and ValueError for others."""
+
+    def make(env: ElbowArmVectorEnv) -> Controller:
+        policy.check(env)
+        return policy
+
+    return make
+
+
+def print_results(title: str, results: Results) -> None:
+    """A table on the terminal: one row per metric, one column per regime, mean and standard deviation."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title)
+    table.add_column("metric")
+    table.add_column("unit")
+    for regime in REGIMES:
+        table.add_column(f"{regime.name}: {regime.meaning.split(':')[0]}", justify="right")
+    for name, unit in UNITS.items():
+        cells = [f"{results[r.name][name].mean():.4g} ± {results[r.name][name].std():.2g}" for r in REGIMES]
+        table.add_row(name.replace("_", " "), unit, *cells)
+    Console().print(table)

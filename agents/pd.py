@@ -1,0 +1,56 @@
+"""The paper's PD controller (eqs 27-29), written against the observation alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from elbow_gym.env import ElbowArmEnv
+from elbow_gym.kinematics import inverse_kinematics
+from elbow_gym.parameters import positive
+from elbow_gym.vector_env import ElbowArmVectorEnv
+
+PAPER_KP = 500.0
+PAPER_KD = 20.0
+
+
+class PDController:
+    """v = kp (q_d - q) + kd (q_d_dot - q_dot) on every joint (eq. 27), in volts, then in the action's unit.
+
+    q_d keeps the start pose but for joints 1, n-1 and n, which put the hand on the target (eq. 29); q_d_dot is its
+    exact derivative.
+
+    Args:
+        env: the environment that it will act in, single or batched.
+        kp: proportional gain [V/rad].
+        kd: derivative gain [V s/rad].
+
+    Raises:
+        ValueError: the circle is out of reach of joints 1, n-1 and n, by how much.
+    """
+
+    def __init__(self, env: ElbowArmEnv | ElbowArmVectorEnv, kp: float = PAPER_KP, kd: float = PAPER_KD) -> None:
+        self.kp, self.kd = positive("kp", kp), positive("kd", kd)
+        episodes = env.unwrapped.episodes
+        self._layout, self._circle = episodes.layout, episodes.circle
+        self._arm, self._pose = episodes.arm, episodes.pose
+        self._volts, self._highest = episodes.volts_per_action, episodes.highest_action
+        self.desired(np.linspace(0.0, 2.0 * np.pi, 73))
+
+    def desired(self, angle: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """q_d [rad] and q_d_dot [rad/s], each (..., n), for the target's angle on the circle [rad], (...)."""
+        position, velocity = self._circle.position(angle), self._circle.velocity(angle)
+        return inverse_kinematics(self._arm, self._pose, position, velocity)
+
+    def predict(
+        self, observation: NDArray[np.float32], *_args: Any, **_kwargs: Any
+    ) -> tuple[NDArray[np.float32], None]:
+        """Actions (..., n) for observations (..., size)."""
+        seen = self._layout.decode(observation)
+        cosine, sine = seen["target_angle"][..., 0], seen["target_angle"][..., 1]
+        q_d, q_d_dot = self.desired(np.arctan2(sine, cosine))
+        voltage = self.kp * (q_d - self._pose - seen["joint_angle"]) + self.kd * (q_d_dot - seen["joint_velocity"])
+        action = np.clip(voltage / self._volts, -self._highest, self._highest)
+        return action.astype(np.float32), None
