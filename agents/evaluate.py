@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 from agents.controller import Controller
 from agents.metrics import REGIMES, UNITS, joint_energies, metrics
 from agents.pd import PDController
-from agents.policy import Policy, load_policy
+from agents.policy import Policy, load_policy, pair
 from agents.recording import record
 from elbow_gym.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 BENCHMARK_SEEDS = tuple(range(20_000, 20_020))
 """Fixed and public; no training and no choice of a policy uses them."""
+
+RECORDING_PERIOD = 0.001
+"""Fast controllers are recorded at this rate [s], slower ones at their own."""
 
 Results = dict[str, dict[str, NDArray[np.float64]]]
 
@@ -38,7 +41,8 @@ def in_all_regimes(
     for regime in REGIMES:
         if regime.start not in recordings:
             started = replace(settings, start=regime.start)
-            recordings[regime.start] = record(started, make_controller, seeds, progress)
+            every = max(1, round(settings.control_frequency * RECORDING_PERIOD))
+            recordings[regime.start] = record(started, make_controller, seeds, progress, every)
         recording = recordings[regime.start]
         results[regime.name] = metrics(recording, regime.since)
         results[regime.name]["joint_energy"] = joint_energies(recording, regime.since)
@@ -62,7 +66,7 @@ def named_controller(
         return settings, PDController
     if name == "pd":
         return Settings(elbows=count, control_frequency=2e3, timestep=5e-4, action_unit=action_unit), PDController
-    is_path = Path(name).with_suffix(".json").is_file()
+    is_path = pair(Path(name))[0].is_file()
     policy = load_policy(name) if is_path else load_policy(name, elbows=count)
     if elbows is not None and policy.settings.elbows != elbows:
         raise ValueError(f"elbows must be {policy.settings.elbows} as in the policy's training, got {elbows}")

@@ -57,7 +57,7 @@ def joint_energies(recording: Recording, since: float = 0.0) -> Array:
 def metrics(recording: Recording, since: float = 0.0) -> dict[str, Array]:
     """The metrics of every episode from `since` seconds on, each (B,), in `UNITS`.
 
-    Errors are taken at the control instants after `since`; a run without elbows has NaN for its elbow force, negative
+    Errors are taken at the recorded instants after `since`; a run without elbows has NaN for its elbow force, negative
     forces pull on the table. Raises ValueError unless `since` lies inside the run.
     """
     k = _first(recording, since)
@@ -87,7 +87,7 @@ def _first(recording: Recording, since: float) -> int:
 
 
 def _return(recording: Recording, k: int) -> Array:
-    stride = max(1, round(RETURN_PERIOD * recording.settings.control_frequency))
+    stride = max(1, round(RETURN_PERIOD / recording.time[1]))
     grid = np.arange(k, recording.time.size, stride)
     error = np.linalg.norm(recording.hand[grid[1:]] - recording.target[grid[1:]], axis=-1)
     meter = recording.electrical_energy if recording.settings.regeneration else recording.drawn_energy

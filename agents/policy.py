@@ -110,8 +110,9 @@ class Policy:
         """Writes `path`.safetensors and `path`.json, each whole or not at all."""
         from safetensors.numpy import save_file
 
-        write_whole(path.with_suffix(".safetensors"), lambda temporary: save_file(self.weights, temporary))
-        write_text(path.with_suffix(".json"), json.dumps(asdict(self.card), indent=2) + "\n")
+        card, weights = pair(path)
+        write_whole(weights, lambda temporary: save_file(self.weights, temporary))
+        write_text(card, json.dumps(asdict(self.card), indent=2) + "\n")
 
 
 def load_policy(source: str | Path, elbows: int | None = None) -> Policy:
@@ -122,8 +123,7 @@ def load_policy(source: str | Path, elbows: int | None = None) -> Policy:
     """
     from safetensors.numpy import load_file
 
-    path = Path(source).with_suffix("") if elbows is None else SHIPPED / f"{source}_elbows{elbows}"
-    card_path, weights_path = path.with_suffix(".json"), path.with_suffix(".safetensors")
+    card_path, weights_path = pair(Path(source) if elbows is None else SHIPPED / f"{source}_elbows{elbows}")
     for needed in (card_path, weights_path):
         if not needed.is_file():
             raise ValueError(
@@ -134,9 +134,15 @@ def load_policy(source: str | Path, elbows: int | None = None) -> Policy:
         card = PolicyCard(**{**plain, "layers": tuple(plain["layers"]), "observation": tuple(plain["observation"])})
     except (TypeError, KeyError, json.JSONDecodeError) as error:
         raise ValueError(
-            f"policy card must be a JSON object of {PolicyCard.__name__}, got {card_path}: {error}"
+            f"policy card must hold the fields of PolicyCard, got {card_path}: {error}"
         ) from error
     return Policy(card, load_file(weights_path))
+
+
+def pair(path: Path) -> tuple[Path, Path]:
+    """The card's and the weights' file of a policy named with or without either's suffix."""
+    stem = path.with_suffix("") if path.suffix in (".json", ".safetensors") else path
+    return stem.with_name(f"{stem.name}.json"), stem.with_name(f"{stem.name}.safetensors")
 
 
 def shipped_policies() -> list[str]:
@@ -165,6 +171,6 @@ def policy_of(model: Any, settings: Settings, command: str, **more: dict[str, An
         layers=(linear[0].in_features, *(layer.out_features for layer in linear)),
         activation=kinds.pop(),
         command=command,
-        **more,
+        **{name: json.loads(json.dumps(value)) for name, value in more.items()},
     )
     return Policy(card, weights)

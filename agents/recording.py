@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Recording:
-    """B whole episodes at the control instants; T control periods, so T + 1 instants."""
+    """B whole episodes at T + 1 instants: the start and the end of every (or every few) control periods."""
 
     settings: Settings
     seeds: tuple[int, ...]
@@ -43,7 +43,7 @@ class Recording:
     below_table: Array
     """Time under the table since the start [s], (T + 1, B)."""
     voltage: Array
-    """Held over the period before each instant (zero at the first) [V], (T + 1, B, n)."""
+    """The largest in size since the instant before (zero at the first) [V], (T + 1, B, n)."""
     current: Array
     """[A], (T + 1, B, n)."""
 
@@ -53,6 +53,7 @@ def record(
     make_controller: Callable[[ElbowArmVectorEnv], Controller],
     seeds: Sequence[int],
     progress: Callable[[int, int], None] | None = None,
+    every: int = 1,
 ) -> Recording:
     """Runs one episode per seed, side by side, through the batched environment's `step`.
 
@@ -61,11 +62,19 @@ def record(
         make_controller: gives the controller for the environment.
         seeds: one per episode.
         progress: called with the periods done and in all, a hundred times a run.
+        every: keeps the end of every so many control periods, a divisor of their number.
+
+    Raises:
+        ValueError: `every` does not divide the number of control periods.
+        ArithmeticError: the simulation left what float64 can represent.
     """
+    horizon = settings.horizon
+    if every < 1 or horizon % every:
+        raise ValueError(f"every must divide the number of control periods ({horizon}), got {every}")
     env = ElbowArmVectorEnv(len(seeds), **settings.arguments, autoreset_mode="Disabled")
     controller = make_controller(env)
     observation, _ = env.reset(seed=list(seeds))
-    episodes, horizon = env.episodes, settings.horizon
+    episodes = env.episodes
     series: dict[str, Any] = {}
 
     def keep(k: int, voltage: Array) -> None:
@@ -85,17 +94,21 @@ def record(
         }
         for name, value in values.items():
             if name not in series:
-                series[name] = np.empty((horizon + 1, *value.shape))
+                series[name] = np.empty((horizon // every + 1, *value.shape))
             series[name][k] = value
 
-    keep(0, np.zeros((len(seeds), episodes.arm.n_joints)))
+    largest = np.zeros((len(seeds), episodes.arm.n_joints))
+    keep(0, largest)
     for k in range(1, horizon + 1):
         action, _ = controller.predict(observation, deterministic=True)
         observation, _, terminated, _, info = env.step(action)
         if terminated.any():
             raise ArithmeticError(f"the simulation left what float64 can represent at {k * settings.control_period} s")
-        keep(k, info["voltage"])
+        largest = np.where(np.abs(info["voltage"]) > np.abs(largest), info["voltage"], largest)
+        if k % every == 0:
+            keep(k // every, largest)
+            largest = np.zeros_like(largest)
         if progress is not None and k % max(1, horizon // 100) == 0:
             progress(k, horizon)
-    time = np.arange(horizon + 1) * settings.control_period
+    time = np.arange(horizon // every + 1) * (every * settings.control_period)
     return Recording(settings, tuple(seeds), time, **series)

@@ -9,7 +9,7 @@ TARGET_COLOUR = "#000000"
 ELBOW_COLOURS = {2: "#0072B2", 1: "#E69F00", 0: "#D55E00"}
 ELBOW_NAMES = {2: "two elbows", 1: "one elbow", 0: "no elbow"}
 CONTROLLER_COLOURS = {"pd_paper": "#D55E00", "pd_24v": "#E69F00", "ppo": "#0072B2", "sac": "#009E73"}
-CONTROLLER_NAMES = {"pd_paper": "PD, unlimited, 10 kHz", "pd_24v": "PD, 24 V, 2 kHz", "ppo": "PPO, 24 V, 50 Hz"}
+CONTROLLER_NAMES = {"pd_paper": "PD, no limit", "pd_24v": "PD, 24 V", "ppo": "PPO, 24 V", "sac": "SAC, 24 V"}
 
 
 def pyplot() -> Any:

@@ -28,7 +28,7 @@ class PPOSettings:
     n_epochs: int = 10
     learning_rate: float = 5e-4
     """At the start; falls linearly to a twentieth."""
-    gamma: float = 0.95
+    gamma: float = 0.97
     """Discount per control period."""
     gae_lambda: float = 0.95
     clip_range: float = 0.2
@@ -91,10 +91,10 @@ def train_ppo(
     )
     keeper = Keeper(settings, ppo, seed, folder, checkpoint_every, minutes)
     try:
-        model.learn(ppo.total_timesteps, callback=keeper, progress_bar=True)
+        model.learn(ppo.total_timesteps, callback=keeper)
     except KeyboardInterrupt:
         print("interrupted; keeping the best policy so far", file=sys.stderr)
-    keeper.evaluate(model)
+    keeper.finish(model)
     return keeper.best
 
 

@@ -1,0 +1,195 @@
+"""`python -m benchmarks energy`: every controller in every regime, one table, CSV, JSON and a figure."""
+
+from __future__ import annotations
+
+import json
+import platform
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from agents.evaluate import BENCHMARK_SEEDS, in_all_regimes, named_controller
+from agents.files import write_csv, write_text, write_whole
+from agents.metrics import REGIMES, UNITS
+from agents.policy import SHIPPED
+from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES, ELBOW_NAMES, pyplot
+from benchmarks.statistics import Estimate, interquartile_mean
+
+RESULTS = Path(__file__).parent / "results"
+PACKAGES = ("elbow-gym", "gymnasium", "numpy", "numba", "scipy", "stable-baselines3", "torch")
+ELBOW_COUNTS = (2, 1, 0)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One controller at one elbow count in one regime."""
+
+    controller: str
+    elbows: int
+    regime: str
+    figures: dict[str, Estimate]
+    joint_energy: tuple[float, ...]
+    """Interquartile mean of each joint's signed electrical energy [J]."""
+
+
+def cells() -> list[tuple[str, int]]:
+    """Controller and elbow count of every comparison: both PDs, and each shipped policy."""
+    pairs = [(name, elbows) for name in ("pd_paper", "pd_24v") for elbows in ELBOW_COUNTS]
+    learned = [(name, elbows) for name in ("ppo", "sac") for elbows in ELBOW_COUNTS]
+    return pairs + [(name, elbows) for name, elbows in learned if (SHIPPED / f"{name}_elbows{elbows}.json").is_file()]
+
+
+def measure(seeds: Sequence[int], progress: Callable[[str, int, int], None]) -> list[Row]:
+    """Runs all cells; `progress` gets a cell's name, the cells done and their number."""
+    rows, everything = [], cells()
+    for k, (name, elbows) in enumerate(everything):
+        progress(f"{name}, {ELBOW_NAMES[elbows]}", k, len(everything))
+        settings, make = named_controller({"pd_24v": "pd"}.get(name, name), elbows)
+        results = in_all_regimes(settings, make, seeds)
+        for regime in REGIMES:
+            values = results[regime.name]
+            figures = {metric: interquartile_mean(values[metric]) for metric in UNITS}
+            joints = tuple(interquartile_mean(column).value for column in values["joint_energy"].T)
+            rows.append(Row(name, elbows, regime.name, figures, joints))
+    progress("done", len(everything), len(everything))
+    return rows
+
+
+HEADER = ("controller", "elbows", "regime", "energy (J)", "drawn (J)", "rms (mm)", "z rms (mm)", "return", "pull (N)")
+
+
+def shown(row: Row, estimate: Callable[[Estimate], str]) -> tuple[str, ...]:
+    """A row's cells under HEADER; `estimate` writes the figures that have an interval."""
+    figures = row.figures
+    force = figures["smallest_elbow_force"].value
+    return (
+        CONTROLLER_NAMES[row.controller],
+        str(row.elbows),
+        row.regime,
+        estimate(figures["electrical_energy"]),
+        f"{figures['drawn_energy'].value:.4g}",
+        estimate(figures["error_rms"]),
+        f"{figures['z_rms'].value:.3g}",
+        f"{figures['return'].value:.4g}",
+        # Only a negative force is a pull on the table.
+        f"{force:.1f}" if force < 0.0 else "-",
+    )
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    """The README's table, with 95 % intervals."""
+    lines = [HEADER, ("---",) * len(HEADER)]
+    lines += [shown(row, lambda e: f"{e.value:.4g} [{e.low:.4g}, {e.high:.4g}]") for row in rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def table(rows: Sequence[Row]) -> Any:
+    """The same for the terminal, without the intervals."""
+    from rich.table import Table
+
+    body = Table(title="Interquartile means over the evaluation episodes")
+    for name in HEADER:
+        body.add_column(name, justify="left" if name == "controller" else "right", no_wrap=name == "controller")
+    for k, row in enumerate(rows):
+        body.add_row(*shown(row, lambda e: f"{e.value:.4g}"), end_section=k % len(REGIMES) == len(REGIMES) - 1)
+    return body
+
+
+def figure(rows: Sequence[Row], path: Path) -> None:
+    """Energy and tracking error of every controller, by regime and elbow count, on logarithmic axes."""
+    plt = pyplot()
+    controllers = list(dict.fromkeys(row.controller for row in rows))
+    fig, axes = plt.subplots(2, len(REGIMES), figsize=(10, 6), sharex=True, sharey="row", layout="constrained")
+    panels = (("electrical_energy", "electrical energy (J)"), ("error_rms", "hand error, rms (mm)"))
+    width = 0.8 / len(controllers)
+    for column, regime in enumerate(REGIMES):
+        axes[0, column].set_title(f"{regime.name}: {regime.meaning}", fontsize=9)
+        for line, (metric, label) in enumerate(panels):
+            ax = axes[line, column]
+            for k, controller in enumerate(controllers):
+                chosen = [row for row in rows if row.controller == controller and row.regime == regime.name]
+                places = [ELBOW_COUNTS.index(row.elbows) + (k - (len(controllers) - 1) / 2) * width for row in chosen]
+                estimates = [row.figures[metric] for row in chosen]
+                values = [e.value for e in estimates]
+                spread = [[e.value - e.low for e in estimates], [e.high - e.value for e in estimates]]
+                colour, name = CONTROLLER_COLOURS[controller], CONTROLLER_NAMES[controller]
+                ax.bar(places, values, width, yerr=spread, color=colour, label=name, error_kw={"lw": 1})
+            ax.set_yscale("log")
+            ax.grid(axis="x", visible=False)
+            ax.set_xticks(range(len(ELBOW_COUNTS)), [ELBOW_NAMES[elbows] for elbows in ELBOW_COUNTS])
+            if column == 0:
+                ax.set_ylabel(label)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside upper center", ncols=len(controllers))
+    fig.savefig(path)
+    plt.close(fig)
+
+
+def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path) -> None:
+    """Writes energy.csv, energy.json, energy.md and energy.png, each whole or not at all."""
+    header = ["controller", "elbows", "regime"]
+    header += [f"{name} [{unit}]{part}" for name, unit in UNITS.items() for part in ("", " low", " high")]
+    joints = max(len(row.joint_energy) for row in rows)
+    header += [f"electrical_energy_joint_{k + 1} [J]" for k in range(joints)]
+    body = [
+        [row.controller, row.elbows, row.regime]
+        + [f"{value:.6g}" for name in UNITS for value in row.figures[name]]
+        + [f"{value:.6g}" for value in row.joint_energy]
+        for row in rows
+    ]
+    write_csv(folder / "energy.csv", header, body)
+    context = {
+        "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
+        "made": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "seconds": round(seconds, 1),
+        "seeds": list(seeds),
+        "machine": {"python": platform.python_version(), "system": platform.system(), "processor": processor()},
+        "versions": {name: found for name in PACKAGES if (found := _version(name))},
+    }
+    write_text(folder / "energy.json", json.dumps(context, indent=2) + "\n")
+    write_text(folder / "energy.md", markdown(rows))
+    write_whole(folder / "energy.png", lambda temporary: figure(rows, temporary))
+
+
+def processor() -> str:
+    """The processor's name, as far as the system tells."""
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        for line in info.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def energy(output: Path = RESULTS, episodes: int = len(BENCHMARK_SEEDS)) -> list[Row]:
+    """Runs the comparison, prints the table and writes the results. Returns the rows."""
+    from rich.console import Console
+    from tqdm import tqdm
+
+    seeds = [BENCHMARK_SEEDS[0] + k for k in range(episodes)]
+    started = time.monotonic()
+    with tqdm(total=len(cells()), file=sys.stderr, unit="controller") as bar:
+
+        def progress(name: str, done: int, _: int) -> None:
+            bar.set_description(name)
+            bar.update(done - bar.n)
+
+        rows = measure(seeds, progress)
+    save(rows, seeds, time.monotonic() - started, output)
+    console = Console()
+    console.print(table(rows))
+    console.print("Regimes: " + "; ".join(f"{regime.name} = {regime.meaning}" for regime in REGIMES))
+    console.print(f"Written: {output / 'energy.csv'}, energy.json, energy.md, energy.png")
+    return rows
