@@ -23,9 +23,9 @@ CASES = (2, 1, 0)
 SETTLED = 2.0
 VIEWS = ((0, 1), (0, 2), (1, 2))
 # Where curves coincide the lower one still shows at the edges of the upper.
-WIDTHS = {2: 3.6, 1: 2.3, 0: 1.2}
+WIDTHS = {2: 3.8, 1: 2.5, 0: 1.4}
 SERIES_PERIOD = 0.01
-"""Between rows of the series and points of the figures [s]."""
+"""Between rows of the series [s]."""
 
 
 def figures(cases: Cases) -> Iterator[tuple[str, Any]]:
@@ -81,10 +81,11 @@ def _trajectories(cases: Cases, number: int, axes: tuple[int, int]) -> Any:
         panel.set(aspect="equal", xlabel=f"{'xyz'[first]} [m]", ylabel=f"{'xyz'[second]} [m]")
         panel.label_outer()
         if number == 1:
-            zoom = panel.inset_axes((0.02, 0.1, 0.62, 0.34))
+            zoom = panel.inset_axes((0.04, 0.06, 0.62, 0.36))
             _follow(zoom, cases[elbows], axes, elbows, SETTLED)
-            zoom.set(aspect="equal", xticks=(), yticks=())
-            zoom.set_title(f"t > {SETTLED:g} s", fontsize="small")
+            zoom.set(aspect="equal", xticks=(), yticks=(), xlim=(1.385, 1.635), ylim=(1.385, 1.635))
+            zoom.text(1.5, 1.5, f"t > {SETTLED:g} s", ha="center")
+            zoom.spines[:].set_visible(True)
     fig.suptitle(f"Fig. {number}: the hand, {'xyz'[first]}-{'xyz'[second]} plane, 0 to {cases[2].time[-1]:g} s")
     fig.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return fig
@@ -93,7 +94,7 @@ def _trajectories(cases: Cases, number: int, axes: tuple[int, int]) -> Any:
 def _follow(panel: Any, run: Recording, axes: tuple[int, int], elbows: int, since: float = 0.0) -> None:
     """The hand from `since` on under the whole target, which stays visible on top of it."""
     late = run.time >= since - 1e-9
-    panel.plot(*run.hand[late, 0][:, axes].T, color=ELBOW_COLOURS[elbows], lw=2.0)
+    panel.plot(*run.hand[late, 0][:, axes].T, color=ELBOW_COLOURS[elbows], lw=1.6)
     panel.plot(*run.target[:, 0, axes].T, color=TARGET_COLOUR, lw=0.8, label="target")
 
 
@@ -145,7 +146,7 @@ def _overview(cases: Cases) -> Any:
         grid[3],
         (energy_of(None), energy_of(None), work_of(None)),
         (0.0, SETTLED, 0.0),
-        ("electrical energy [J]", f"the same from t = {SETTLED:g} s on [J]", "link work [J]"),
+        ("electrical energy [J]", f"energy from t = {SETTLED:g} s on [J]", "link work [J]"),
         strict=True,
     ):
         _curves(panel, cases, course, since)
@@ -166,17 +167,18 @@ def _share_limits(panels: Any) -> None:
 
 
 def _label_ends(panel: Any) -> None:
-    """Writes above each curve's end what it comes to."""
+    """Writes right of each curve's end what it comes to."""
     for line in panel.get_lines():
         end = line.get_xdata()[-1], line.get_ydata()[-1]
         panel.annotate(
-            f"{end[1]:.0f} J",
+            f"{end[1]:.0f}",
             end,
-            xytext=(-3, 4),
+            xytext=(4, 0),
             textcoords="offset points",
-            ha="right",
+            va="center",
             color=line.get_color(),
             fontweight="bold",
+            annotation_clip=False,
         )
 
 
@@ -188,7 +190,7 @@ def thinned(run: Recording, period: float) -> Recording:
 
 
 def write_series(path: Path, cases: Cases) -> Path:
-    """Writes a CSV row per case and instant; cells of elbows that a case does not have are empty."""
+    """Writes a CSV row per case and `SERIES_PERIOD`; cells of elbows that a case does not have are empty."""
     joints = range(1, cases[2].q.shape[2] + 1)
     elbows_of_all = cases[2].settings.elbow_joints
     header = [
@@ -201,7 +203,8 @@ def write_series(path: Path, cases: Cases) -> Path:
     ]
 
     def rows() -> Iterator[list[Any]]:
-        for elbows, run in cases.items():
+        for elbows, whole in cases.items():
+            run = thinned(whole, SERIES_PERIOD)
             columns = (run.hand, run.target, run.link_work, run.electrical_energy, run.elbow_force)
             block = np.column_stack([run.time, *(column[:, 0] for column in columns)])
             missing = [""] * (len(elbows_of_all) - len(run.settings.elbow_joints))

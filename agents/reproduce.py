@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.figures import CASES, SERIES_PERIOD, SETTLED, draw, thinned, write_series
+from agents.figures import CASES, SETTLED, draw, thinned, write_series
 from agents.files import write_csv, write_text, write_whole
 from agents.metrics import joint_energies, metrics
 from agents.pd import PDController
@@ -25,6 +25,8 @@ from elbow_gym.settings import Settings
 RESULTS = Path(__file__).resolve().parents[1] / "benchmarks" / "results"
 RECORD_PERIOD = 2e-4
 """At most, between the instants that the numbers are taken from [s]; keeping every period takes longer to run."""
+PICTURE_PERIOD = 0.002
+"""Between the points of the figures [s]."""
 # A figure takes about as long to draw as this many control periods to run, so that one bar's time left holds for both.
 FIGURE_PERIODS = 1500
 
@@ -73,7 +75,7 @@ class Reproduction:
 
 @dataclass(frozen=True)
 class Played:
-    """One run: what `measure` found and its series, every `SERIES_PERIOD`."""
+    """One run: what `measure` found and its series, every `PICTURE_PERIOD`."""
 
     values: dict[str, Any]
     series: Recording
@@ -99,13 +101,13 @@ def reproduce(output: Path = Path("reproduction"), publish: bool = False) -> Rep
         numbers = {elbows: case_numbers({name: played[elbows, name].values for name in RUNS}) for elbows in CASES}
         series = {elbows: played[elbows, "paper"].series for elbows in CASES}
         bar.set_description("drawing")
-        pictures = draw(series, output, lambda: bar.update(FIGURE_PERIODS))
+        draw(series, output, lambda: bar.update(FIGURE_PERIODS))
     write_series(output / "series.csv", series)
     write_numbers(output / "numbers.csv", numbers)
     text = as_markdown(numbers)
     write_text(output / "verdict.md", text)
     if publish:
-        overview = pictures[-1].read_bytes()
+        overview = (output / "paper_cases.png").read_bytes()
         write_whole(RESULTS / "paper_cases.png", lambda temporary: temporary.write_bytes(overview))
         write_numbers(RESULTS / "paper_numbers.csv", numbers)
     console = Console()
@@ -132,7 +134,7 @@ def play(settings: Settings, progress: Callable[[int], Any] | None = None) -> Pl
     every = max(1, round(RECORD_PERIOD * settings.control_frequency))
     run = record(settings, PDController, (0,), tell, every)
     tell(settings.horizon, settings.horizon)
-    return Played(measure(run), thinned(run, SERIES_PERIOD))
+    return Played(measure(run), thinned(run, PICTURE_PERIOD))
 
 
 def measure(run: Recording) -> dict[str, Any]:
@@ -191,10 +193,10 @@ def play_all(jobs: Mapping[Any, Settings], progress: Callable[[int], Any]) -> di
         # The longest first, so that no core idles at the end.
         longest = sorted(jobs, key=lambda key: -jobs[key].horizon)
         futures = {key: pool.submit(_play_in_worker, jobs[key]) for key in longest}
+        unfinished = set(futures.values())
         try:
-            running = True
-            while running:
-                finished, running = wait(futures.values(), timeout=0.1, return_when=FIRST_EXCEPTION)
+            while unfinished:
+                finished, unfinished = wait(unfinished, timeout=0.1, return_when=FIRST_EXCEPTION)
                 for future in finished:
                     future.result()
                 while not ticks.empty():
@@ -286,4 +288,4 @@ def _cell(quantity: Quantity) -> str:
     if quantity.value is None:
         return ""
     value = f"{quantity.value:.5g}"
-    return value if quantity.difference is None else f"{value} ({quantity.difference:+.2%})"
+    return value if quantity.difference is None else f"{value} ({quantity.difference:+.1%})"

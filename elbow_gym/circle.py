@@ -6,6 +6,7 @@ import math
 import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -90,7 +91,7 @@ class Circle:
         """Angle of the target on the circle [rad] at a time [s], starting from `phase` [rad]."""
         return np.asarray(phase, dtype=np.float64) + self.rate * np.asarray(time, dtype=np.float64)
 
-    @property
+    @cached_property
     def path(self) -> Array:
         """Fourier rows of the path [m], (3, 3): the centre, then what the angle's cosine and sine multiply."""
         first, second = self._axes()
@@ -100,10 +101,14 @@ class Circle:
         """Target position r_d [m], shape (..., 3), at an angle [rad], shape (...).   Eq. 28."""
         return _points(self.path, angle)
 
+    @cached_property
+    def _path_rate(self) -> Array:
+        _, cosine, sine = self.path
+        return np.array([np.zeros(3), self.rate * sine, -self.rate * cosine])
+
     def velocity(self, angle: ArrayLike) -> Array:
         """Target velocity [m/s], shape (..., 3), at an angle [rad], shape (...)."""
-        _, cosine, sine = self.path
-        return _points(np.array([np.zeros(3), self.rate * sine, -self.rate * cosine]), angle)
+        return _points(self._path_rate, angle)
 
 
 def _points(path: Array, angle: ArrayLike) -> Array:

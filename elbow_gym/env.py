@@ -66,8 +66,8 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     | Name | Entries | Unit | Scale | Limit | Meaning |
     |------|---------|------|-------|-------|---------|
-    | joint_angle | n | rad | 0.5 | 10 | joint angle minus the start pose's |
-    | joint_velocity | n | rad/s | 5 | 100 | joint velocity |
+    | joint_angle | n | rad | 0.3 | 10 | joint angle minus the start pose's |
+    | joint_velocity | n | rad/s | 2 | 100 | joint velocity |
     | current | n | A | 5 | 500 | armature current |
     | hand_error | 3 | m | 0.5 | 10 | hand minus target, along x, y, z |
     | hand_position | 3 | m | 0.5 | 10 | hand minus the circle's centre, along x, y, z |

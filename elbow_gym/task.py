@@ -31,8 +31,8 @@ class Feature(NamedTuple):
 
 
 FEATURES = (
-    Feature("joint_angle", "rad", 0.5, 10.0, "joint angle minus the start pose's"),
-    Feature("joint_velocity", "rad/s", 5.0, 100.0, "joint velocity"),
+    Feature("joint_angle", "rad", 0.3, 10.0, "joint angle minus the start pose's"),
+    Feature("joint_velocity", "rad/s", 2.0, 100.0, "joint velocity"),
     Feature("current", "A", 5.0, 500.0, "armature current"),
     Feature("hand_error", "m", 0.5, 10.0, "hand minus target, along x, y, z"),
     Feature("hand_position", "m", 0.5, 10.0, "hand minus the circle's centre, along x, y, z"),
