@@ -133,9 +133,7 @@ def load_policy(source: str | Path, elbows: int | None = None) -> Policy:
         plain = json.loads(card_path.read_text(encoding="utf-8"))
         card = PolicyCard(**{**plain, "layers": tuple(plain["layers"]), "observation": tuple(plain["observation"])})
     except (TypeError, KeyError, json.JSONDecodeError) as error:
-        raise ValueError(
-            f"policy card must hold the fields of PolicyCard, got {card_path}: {error}"
-        ) from error
+        raise ValueError(f"policy card must hold the fields of PolicyCard, got {card_path}: {error}") from error
     return Policy(card, load_file(weights_path))
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class PPOSettings:
     """Proximal policy optimisation: SB3's settings, chosen for this arm."""
 
-    total_timesteps: int = 2_000_000
+    total_timesteps: int = 1_500_000
     """Control periods in all."""
     num_envs: int = 32
     """Arms side by side."""

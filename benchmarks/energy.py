@@ -188,7 +188,8 @@ def energy(output: Path = RESULTS, episodes: int = len(BENCHMARK_SEEDS)) -> list
 
         rows = measure(seeds, progress)
     save(rows, seeds, time.monotonic() - started, output)
-    console = Console()
+    # Wider than a pipe's 80 columns, which would cut the figures.
+    console = Console(width=max(Console().width, 100))
     console.print(table(rows))
     console.print("Regimes: " + "; ".join(f"{regime.name} = {regime.meaning}" for regime in REGIMES))
     console.print(f"Written: {output / 'energy.csv'}, energy.json, energy.md, energy.png")

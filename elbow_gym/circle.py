@@ -44,10 +44,11 @@ class Circle:
         center = self.center
         if not isinstance(center, list | tuple | np.ndarray) or len(center) != 3:
             raise ValueError(f"circle center must have three coordinates, got {center!r}")
-        coordinates = tuple(float(value) for value in center)
-        if not all(math.isfinite(value) for value in coordinates):
+        if not all(isinstance(value, numbers.Real) for value in center):
+            raise ValueError(f"circle center must be three numbers, got {center!r}")
+        if not all(math.isfinite(value) for value in center):
             raise ValueError(f"circle center must be finite, got {center!r}")
-        object.__setattr__(self, "center", coordinates)
+        object.__setattr__(self, "center", tuple(float(value) for value in center))
         object.__setattr__(self, "radius", positive("circle radius", self.radius))
         object.__setattr__(self, "period", positive("circle period", self.period))
         if self.plane not in PLANES:
@@ -124,7 +125,8 @@ def as_phase(phase: object) -> float:
         raise ValueError(f"phase must be an angle in rad, got {phase!r}")
     if not math.isfinite(phase):
         raise ValueError(f"phase must be finite, got {phase!r}")
-    return float(phase)
+    # The target needs the angle alone; whole turns would cost it digits.
+    return math.remainder(phase, 2.0 * math.pi) if abs(float(phase)) > 1e3 else float(phase)
 
 
 def as_circle(circle: object) -> Circle:

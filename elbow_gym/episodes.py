@@ -148,6 +148,7 @@ class Episodes:
         """
         settings, simulator = self.settings, self.simulator
         voltage = np.minimum(np.maximum(action, -self._highest), self._highest) * self._volts
+        voltage = np.ascontiguousarray(voltage)
         if math.isnan(voltage.sum()):
             raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
         simulator.advance(voltage, settings.n_substeps)

@@ -1,9 +1,10 @@
 """The compiled core: the arm's O(n) articulated-body recursion, RK4 and energy meters, lanes innermost.
 
-Coordinates inside are the yaw psi = q_1 and the absolute pitches phi_a, where the mass matrix is block
-diagonal. A *block* is W arms side by side in one flat float64 workspace: record a holds joint a + 1 (record n
-the tip), each slot of a record is a row of W lanes, so entry (record a, slot S, lane k) sits at
-`a * STRIDE + S + k`. One array, constant slot offsets and straight bodies under `for k in range(W)` let LLVM
+Coordinates inside are the yaw psi = q_1 and the absolute pitches phi_a, where the mass matrix is block diagonal. A
+*block* is W arms side by side in one flat float64 workspace: record a holds joint a + 1 (record n the tip), each slot
+of a record is a row of W lanes, so entry (record a, slot S, lane k) sits at `o + S + k` with o = a * STRIDE, and a pass
+hands values on by writing its own record and reading the one before (`o - NEXT`) or after it (`o + NEXT`). One array,
+constant slot offsets and straight bodies under `for k in range(LANES)` let LLVM prove that rows do not overlap, and
 vectorise; strict floating point and the sine below keep every lane's bits the same for any W.
 
 Symbols are those of the derivation: links have e = (sin phi, cos phi) in the (rho, z) plane and
@@ -12,11 +13,12 @@ This is the only file with compiled code: Numba's cache does not notice edits in
 """
 
 # pyright: basic
-# ruff: noqa: E741, ANN001, ANN201, ANN202, PLR0912, PLR0915
+# ruff: noqa: E741, ANN001, ANN201, ANN202
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple
+from types import FunctionType
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -48,9 +50,11 @@ LARGEST_ANGLE = 1e5
 # Elbows rest at z = 0 to 1e-8 m; lower than this is under the table.
 BELOW_TABLE_TOLERANCE = 1e-6
 MAXIMUM_ELBOWS = 8
-BLOCK_LANES = 16
-# Rows of a record, named where the kernel is made; one row per possible elbow follows them.
-SLOTS = 72
+# A projection onto the table is repeated while it turns a link by more than this [rad], so many times at most.
+SMALL_SHIFT = 1e-7
+NEWTON_STEPS = 30
+# Slots of a record, named where the kernel is made; one per possible elbow follows them.
+SLOTS = 56
 
 _ROUND = 6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds to the nearest integer
 _TWO_OVER_PI = 0.6366197723675814
@@ -63,9 +67,41 @@ _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.1359
 
 
 U = np.uint64
+BLOCK_LANES = 16
+W = BLOCK_LANES  # the length of a row in the workspace
+LANES = U(W)
+(
+    Q, QD, I, Q0, QD0, I0, QA, QDA, IA, ELECTRICAL, DRAWN, COPPER, FRICTION, WORK, V,
+    LENGTH, MASS, END_INERTIA, DIFFERENCE, AXIAL, ROTOR, KM, DAMPING, MOTOR_DAMPING, RESISTANCE, INVERSE_L,
+    GRAVITY, PAYLOAD,
+    PHI, OMEGA, SPIN, RHO, RHOD, SUMR, SUMZ, Z, YAW, YAWD, LOW, ER, EZ, FR, FZ, T, D,
+    KRR, KRZ, KZZ, KR3, KZ3, K33, BR, BZ, B3, FREE, GAIN,
+) = (U(W * row) for row in range(SLOTS))  # fmt: skip
+# Slots that one pass is done with serve the next: `inward` turns FR, FZ, T into I_f3 and r.
+IR3, IZ3, R = FR, FZ, T
+AR, AZ, ALPHA = CR, CZ, C3 = KRR, KRZ, KZZ
+HEIGHT, RATE, GRAM = K33, BR, BZ
+Y = W * SLOTS
+STRIDE = W * (SLOTS + MAXIMUM_ELBOWS)
+NEXT = U(STRIDE)
+# Rows of a block: the Delassus matrix and the elbow forces, time below the table, the projection's shift and mask.
+FORCES = U(W * MAXIMUM_ELBOWS * MAXIMUM_ELBOWS)
+BELOW = U(W * (MAXIMUM_ELBOWS + 1) * MAXIMUM_ELBOWS)
+SHIFT = BELOW + U(W)
+ACTIVE = SHIFT + U(W)
+TAIL = W * ((MAXIMUM_ELBOWS + 1) * MAXIMUM_ELBOWS + 3)
+# Everything above that is measured in lanes, and the templates that are inlined into their callers.
+SCALED = (
+    "W", "LANES", "Y", "STRIDE", "NEXT", "FORCES", "BELOW", "SHIFT", "ACTIVE", "TAIL",
+    "Q", "QD", "I", "Q0", "QD0", "I0", "QA", "QDA", "IA", "ELECTRICAL", "DRAWN", "COPPER", "FRICTION", "WORK", "V",
+    "LENGTH", "MASS", "END_INERTIA", "DIFFERENCE", "AXIAL", "ROTOR", "KM", "DAMPING", "MOTOR_DAMPING", "RESISTANCE",
+    "INVERSE_L", "GRAVITY", "PAYLOAD", "PHI", "OMEGA", "SPIN", "RHO", "RHOD", "SUMR", "SUMZ", "Z", "YAW", "YAWD", "LOW",
+    "ER", "EZ", "FR", "FZ", "T", "D", "KRR", "KRZ", "KZZ", "KR3", "KZ3", "K33", "BR", "BZ", "B3", "FREE", "GAIN",
+    "IR3", "IZ3", "R", "AR", "AZ", "ALPHA", "CR", "CZ", "C3", "HEIGHT", "RATE", "GRAM",
+)  # fmt: skip
+INLINED = ("sincos", "joint", "stage")
 
 
-@njit(cache=True, nogil=True)
 def sincos(x):
     """Sine and cosine [-] of an angle [rad], to 1e-16 absolute for |x| < 1e5: no branch, no library call."""
     turns = (x * _TWO_OVER_PI + _ROUND) - _ROUND
@@ -82,7 +118,10 @@ def sincos(x):
     return s, c
 
 
-@njit(cache=True, nogil=True)
+_sincos = njit(nogil=True, error_model="numpy")(sincos)
+
+
+@njit(nogil=True, error_model="numpy")
 def _path_point(coefficients, c, s, out):
     ch, sh = c, s
     for axis in range(3):
@@ -96,7 +135,7 @@ def _path_point(coefficients, c, s, out):
 def _path(coefficients, angle, out):
     """Points out (m, 3) of a closed path at angles (m,): a Fourier series, rows 1, cos, sin, cos 2, sin 2..."""
     for i in range(angle.size):
-        s, c = sincos(angle[i])
+        s, c = _sincos(angle[i])
         _path_point(coefficients, c, s, out[i])
 
 
@@ -110,9 +149,9 @@ def _observe(state, summary, pose, coefficients, angle, lookahead, scale, high, 
     later = np.empty(3)
     target = np.empty(3)
     for b in range(state.shape[0]):
-        s, c = sincos(angle[b])
+        s, c = _sincos(angle[b])
         _path_point(coefficients[b], c, s, target)
-        s_later, c_later = sincos(angle[b] + lookahead)
+        s_later, c_later = _sincos(angle[b] + lookahead)
         _path_point(coefficients[b], c_later, s_later, later)
         squared = 0.0
         for m in range(observation.shape[1]):
@@ -142,12 +181,467 @@ def _observe(state, summary, pose, coefficients, angle, lookahead, scale, high, 
 
 
 Compiled = Callable[..., None]
-path: Compiled = njit(cache=True, nogil=True)(_path)
-observe: Compiled = njit(cache=True, nogil=True)(_observe)
+path: Compiled = njit(cache=True, nogil=True, error_model="numpy")(_path)
+observe: Compiled = njit(cache=True, nogil=True, error_model="numpy")(_observe)
+
+
+def project(ws, tail, elbows):
+    """Newton steps of pose and rates onto the elbows' plane, least change of absolute pitch.
+
+    Mostly one: the drift is the integrator's local error, whose square is below rounding. Near a segment that stands
+    upright it takes more. A lane stops by its own shift, so its bits do not depend on its neighbours'.
+    """
+    for k in range(LANES):
+        tail[SHIFT + k] = np.inf
+    for _ in range(NEWTON_STEPS):
+        moving = False
+        for k in range(LANES):
+            moving = moving or tail[SHIFT + k] > SMALL_SHIFT
+        if not moving:
+            break
+        newton(ws, tail, elbows)
+
+
+def newton(ws, tail, elbows):
+    """One step of `project` in the lanes whose last shift was not small.
+
+    All elbows lie at z = 0, so the links between two neighbours close on their own and no matrix is solved.
+    """
+    for k in range(LANES):
+        tail[ACTIVE + k] = 1.0 if tail[SHIFT + k] > SMALL_SHIFT else 0.0
+        tail[SHIFT + k] = 0.0
+    first = 1
+    for j in range(elbows.size):
+        last = elbows[j] - 2
+        o = U((first - 1) * STRIDE)
+        for k in range(LANES):
+            ws[o + HEIGHT + k] = 0.0
+            ws[o + RATE + k] = 0.0
+            # A floor far below any real lever arm keeps a segment that stands upright finite.
+            ws[o + GRAM + k] = 1e-12
+        for a in range(first, last + 1):
+            o = U(a * STRIDE)
+            for k in range(LANES):
+                phi = ws[o - NEXT + PHI + k] + ws[o + Q + k]
+                omega = ws[o - NEXT + OMEGA + k] + ws[o + QD + k]
+                s, c = sincos(phi)
+                length = ws[o + LENGTH + k]
+                ls = length * s
+                ws[o + PHI + k] = phi
+                ws[o + OMEGA + k] = omega
+                ws[o + HEIGHT + k] = ws[o - NEXT + HEIGHT + k] + length * c
+                ws[o + RATE + k] = ws[o - NEXT + RATE + k] - ls * omega
+                ws[o + GRAM + k] = ws[o - NEXT + GRAM + k] + ls * ls
+                ws[o + ER + k] = ls
+        o = U(last * STRIDE)
+        for k in range(LANES):
+            scale = tail[ACTIVE + k] / ws[o + GRAM + k]
+            ws[o + HEIGHT + k] *= scale
+            ws[o + RATE + k] *= scale
+        # Tip to base: a link's own absolute shift, which the link after it takes back from its relative angle.
+        for a in range(last, first - 1, -1):
+            o = U(a * STRIDE)
+            for k in range(LANES):
+                height = ws[o + HEIGHT + k]
+                rate = ws[o + RATE + k]
+                shift = ws[o + ER + k] * height
+                kick = ws[o + ER + k] * rate
+                ws[o - NEXT + HEIGHT + k] = height
+                ws[o - NEXT + RATE + k] = rate
+                ws[o + Q + k] += shift
+                ws[o + QD + k] += kick
+                ws[o + NEXT + Q + k] -= shift
+                ws[o + NEXT + QD + k] -= kick
+                tail[SHIFT + k] = max(tail[SHIFT + k], abs(shift))
+        first = last + 1
+
+
+def outward(ws, n):
+    """Positions, velocity products, yaw inertia and each link's inertial and gravity force, base to tip."""
+    for a in range(1, n):
+        o = U(a * STRIDE)
+        for k in range(LANES):
+            phi = ws[o - NEXT + PHI + k] + ws[o + Q + k]
+            w = ws[o - NEXT + OMEGA + k] + ws[o + QD + k]
+            s, c = sincos(phi)
+            m = ws[o + MASS + k]
+            half = 0.5 * ws[o + LENGTH + k]
+            difference = ws[o + DIFFERENCE + k]
+            spin = ws[o - NEXT + SPIN + k]
+            hs = half * s
+            hc = half * c
+            ww = w * w
+            rho = ws[o - NEXT + RHO + k] + hs
+            rhod = ws[o - NEXT + RHOD + k] + hc * w
+            sumr = ws[o - NEXT + SUMR + k] - hs * ww
+            sumz = ws[o - NEXT + SUMZ + k] - hc * ww
+            z = ws[o - NEXT + Z + k] + 2.0 * hc
+            fr = m * (sumr - rho * spin)
+            fz = m * (sumz + ws[o + GRAVITY + k])
+            dsc = difference * s * c
+            ws[o + PHI + k] = phi
+            ws[o + OMEGA + k] = w
+            ws[o + SPIN + k] = spin
+            ws[o + RHO + k] = rho + hs
+            ws[o + RHOD + k] = rhod + hc * w
+            ws[o + SUMR + k] = sumr - hs * ww
+            ws[o + SUMZ + k] = sumz - hc * ww
+            ws[o + Z + k] = z
+            ws[o + LOW + k] = min(ws[o - NEXT + LOW + k], z)
+            ws[o + YAW + k] = ws[o - NEXT + YAW + k] + m * rho * rho + difference * s * s + ws[o + AXIAL + k]
+            ws[o + YAWD + k] = ws[o - NEXT + YAWD + k] + 2.0 * (m * rho * rhod + dsc * w)
+            ws[o + ER + k] = 2.0 * hc
+            ws[o + EZ + k] = -2.0 * hs
+            ws[o + FR + k] = fr
+            ws[o + FZ + k] = fz
+            ws[o + T + k] = hc * fr - hs * fz - dsc * spin
+
+
+def inward(ws, n):
+    """Articulated inertia K and bias b, tip to base; starts from the payload at the tip."""
+    o = U(n * STRIDE)
+    for k in range(LANES):
+        load = ws[o - NEXT + PAYLOAD + k]
+        ws[o + KRR + k] = load
+        ws[o + KRZ + k] = 0.0
+        ws[o + KZZ + k] = load
+        ws[o + KR3 + k] = 0.0
+        ws[o + KZ3 + k] = 0.0
+        ws[o + K33 + k] = 0.0
+        ws[o + BR + k] = load * (ws[o - NEXT + SUMR + k] - ws[o - NEXT + RHO + k] * ws[o - NEXT + SPIN + k])
+        ws[o + BZ + k] = load * (ws[o - NEXT + SUMZ + k] + ws[o - NEXT + GRAVITY + k])
+        ws[o + B3 + k] = 0.0
+    for a in range(n - 1, 0, -1):
+        o = U(a * STRIDE)
+        for k in range(LANES):
+            er = ws[o + ER + k]
+            ez = ws[o + EZ + k]
+            m = ws[o + MASS + k]
+            j = ws[o + ROTOR + k]
+            krr = ws[o + NEXT + KRR + k]
+            krz = ws[o + NEXT + KRZ + k]
+            kzz = ws[o + NEXT + KZZ + k]
+            kr3 = ws[o + NEXT + KR3 + k]
+            kz3 = ws[o + NEXT + KZ3 + k]
+            br = ws[o + NEXT + BR + k]
+            bz = ws[o + NEXT + BZ + k]
+            gr = krr * er + krz * ez + kr3
+            gz = krz * er + kzz * ez + kz3
+            ir3 = 0.5 * m * er + gr
+            iz3 = 0.5 * m * ez + gz
+            i33 = ws[o + END_INERTIA + k] + er * (gr + kr3) + ez * (gz + kz3) + ws[o + NEXT + K33 + k]
+            u = ws[o + KM + k] * ws[o + I + k] - ws[o + DAMPING + k] * ws[o + QD + k]
+            r = u - (ws[o + T + k] + er * br + ez * bz + ws[o + NEXT + B3 + k])
+            d = 1.0 / (i33 + j)
+            dj = d * j
+            dr = d * r
+            ws[o + KRR + k] = m + krr - d * ir3 * ir3
+            ws[o + KRZ + k] = krz - d * ir3 * iz3
+            ws[o + KZZ + k] = m + kzz - d * iz3 * iz3
+            ws[o + KR3 + k] = dj * ir3
+            ws[o + KZ3 + k] = dj * iz3
+            ws[o + K33 + k] = j - j * dj
+            ws[o + BR + k] = ws[o + FR + k] + br + dr * ir3
+            ws[o + BZ + k] = ws[o + FZ + k] + bz + dr * iz3
+            ws[o + B3 + k] = u - j * dr
+            ws[o + IR3 + k] = ir3
+            ws[o + IZ3 + k] = iz3
+            ws[o + R + k] = r
+            ws[o + D + k] = d
+
+
+def solve(tail, lanes, p):
+    """Elbow forces -W^-1 f in place of f, by Cholesky W = L L^T in place; the diagonal then holds 1 / L_jj."""
+    for j in range(p):
+        row = U(j * MAXIMUM_ELBOWS * W)
+        force = FORCES + U(j * W)
+        diagonal = row + U(j * W)
+        for i in range(j):
+            other = U(i * MAXIMUM_ELBOWS * W)
+            entry = row + U(i * W)
+            for m in range(i):
+                for k in range(lanes):
+                    tail[entry + k] -= tail[row + U(m * W) + k] * tail[other + U(m * W) + k]
+            for k in range(lanes):
+                tail[entry + k] *= tail[other + U(i * W) + k]
+        for m in range(j):
+            for k in range(lanes):
+                lower = tail[row + U(m * W) + k]
+                tail[diagonal + k] -= lower * lower
+                tail[force + k] -= lower * tail[FORCES + U(m * W) + k]
+        for k in range(lanes):
+            # Elbows that cannot move against each other leave nothing to solve for: the floor keeps that finite.
+            inverse = 1.0 / np.sqrt(max(tail[diagonal + k], 1e-12))
+            tail[diagonal + k] = inverse
+            tail[force + k] *= inverse
+    for j in range(p - 1, -1, -1):
+        force = FORCES + U(j * W)
+        diagonal = U((j * MAXIMUM_ELBOWS + j) * W)
+        for m in range(j + 1, p):
+            entry = U((m * MAXIMUM_ELBOWS + j) * W)
+            for k in range(lanes):
+                # Forces already solved carry their final minus sign.
+                tail[force + k] += tail[entry + k] * tail[FORCES + U(m * W) + k]
+        for k in range(lanes):
+            tail[force + k] *= -tail[diagonal + k]
+
+
+def brace(ws, tail, elbows):
+    """Elbow forces: f = -W^-1 z_ddot_free, with W = sum of d y y^T and z_ddot_free = sum of d y r + J_dot q_dot.
+
+    y is the recursion's answer to a unit +z force at an elbow; the forces then add sum of y f to r.
+    """
+    # An opaque trip count: LLVM would unroll short bodies of a known one into scalar code.
+    lanes = min(LANES, U(ws.size))
+    for j in range(elbows.size):
+        last = elbows[j] - 2
+        y_slot = U(Y + j * W)
+        row = U(j * MAXIMUM_ELBOWS * W)
+        o = U(last * STRIDE)
+        for k in range(lanes):
+            ws[o + NEXT + CR + k] = 0.0
+            ws[o + NEXT + CZ + k] = -1.0
+            ws[o + NEXT + C3 + k] = 0.0
+            ws[o + NEXT + FREE + k] = ws[o + SUMZ + k]
+            ws[o + NEXT + GAIN + k] = 0.0
+        for a in range(last, 0, -1):
+            o = U(a * STRIDE)
+            for k in range(LANES):
+                cr = ws[o + NEXT + CR + k]
+                cz = ws[o + NEXT + CZ + k]
+                y = -(ws[o + ER + k] * cr + ws[o + EZ + k] * cz + ws[o + NEXT + C3 + k])
+                dy = ws[o + D + k] * y
+                ws[o + CR + k] = cr + dy * ws[o + IR3 + k]
+                ws[o + CZ + k] = cz + dy * ws[o + IZ3 + k]
+                ws[o + C3 + k] = -ws[o + ROTOR + k] * dy
+                ws[o + FREE + k] = ws[o + NEXT + FREE + k] + dy * ws[o + R + k]
+                ws[o + GAIN + k] = ws[o + NEXT + GAIN + k] + dy * y
+                ws[o + y_slot + k] = y
+        for k in range(lanes):
+            tail[row + U(j * W) + k] = ws[NEXT + GAIN + k]
+            tail[FORCES + U(j * W) + k] = ws[NEXT + FREE + k]
+        for i in range(j):
+            other = U(Y + i * W)
+            entry = row + U(i * W)
+            for k in range(lanes):
+                tail[entry + k] = 0.0
+            for a in range(1, elbows[i] - 1):
+                o = U(a * STRIDE)
+                for k in range(lanes):
+                    tail[entry + k] += ws[o + D + k] * ws[o + y_slot + k] * ws[o + other + k]
+    solve(tail, lanes, elbows.size)
+    for j in range(elbows.size):
+        y_slot = U(Y + j * W)
+        force = FORCES + U(j * W)
+        for a in range(1, elbows[j] - 1):
+            o = U(a * STRIDE)
+            for k in range(lanes):
+                ws[o + R + k] += ws[o + y_slot + k] * tail[force + k]
+
+
+def evaluate(ws, tail, n, elbows):
+    """All that the joint accelerations are made of, at the current stage's state."""
+    outward(ws, n)
+    inward(ws, n)
+    brace(ws, tail, elbows)
+
+
+def joint(ws, o, k, q_ddot, weight, ahead, first, last):
+    """Adds one RK4 stage of a joint to the step's increments and meters, and sets its next state."""
+    q = ws[o + Q + k] if first else ws[o + Q0 + k]
+    q_dot = ws[o + QD + k]
+    i = ws[o + I + k]
+    qd = q_dot if first else ws[o + QD0 + k]
+    i0 = i if first else ws[o + I0 + k]
+    v = ws[o + V + k]
+    resistance = ws[o + RESISTANCE + k]
+    km = ws[o + KM + k]
+    i_dot = (v - resistance * i - km * q_dot) * ws[o + INVERSE_L + k]
+    power = v * i
+    torque = km * i - ws[o + ROTOR + k] * q_ddot - ws[o + MOTOR_DAMPING + k] * q_dot
+    ws[o + ELECTRICAL + k] += weight * power
+    ws[o + DRAWN + k] += weight * max(power, 0.0)
+    ws[o + COPPER + k] += weight * (resistance * i * i)
+    ws[o + FRICTION + k] += weight * (ws[o + DAMPING + k] * q_dot * q_dot)
+    ws[o + WORK + k] += weight * (torque * q_dot)
+    qa = weight * q_dot
+    qda = weight * q_ddot
+    ia = weight * i_dot
+    if first:
+        ws[o + Q0 + k] = q
+        ws[o + QD0 + k] = qd
+        ws[o + I0 + k] = i0
+    else:
+        qa += ws[o + QA + k]
+        qda += ws[o + QDA + k]
+        ia += ws[o + IA + k]
+    if not last:
+        ws[o + QA + k] = qa
+        ws[o + QDA + k] = qda
+        ws[o + IA + k] = ia
+    ws[o + Q + k] = q + (qa if last else ahead * q_dot)
+    ws[o + QD + k] = qd + (qda if last else ahead * q_ddot)
+    ws[o + I + k] = i0 + (ia if last else ahead * i_dot)
+
+
+def stage(ws, n, weight, ahead, first, last):
+    """Joint accelerations, base to tip (the yaw stands alone), and what the stage makes of them."""
+    end = U((n - 1) * STRIDE)
+    for k in range(LANES):
+        load = ws[end + PAYLOAD + k]
+        rho = ws[end + RHO + k]
+        inertia = ws[end + YAW + k] + load * rho * rho + ws[ROTOR + k]
+        rate = ws[end + YAWD + k] + 2.0 * load * rho * ws[end + RHOD + k]
+        u = ws[KM + k] * ws[I + k] - ws[DAMPING + k] * ws[QD + k]
+        joint(ws, U(0), k, (u - rate * ws[QD + k]) / inertia, weight, ahead, first, last)
+        ws[SPIN + k] = ws[QD + k] * ws[QD + k]
+    for a in range(1, n):
+        o = U(a * STRIDE)
+        for k in range(LANES):
+            ar = ws[o - NEXT + AR + k]
+            az = ws[o - NEXT + AZ + k]
+            before = ws[o - NEXT + ALPHA + k]
+            rest = ws[o + R + k] - ws[o + IR3 + k] * ar - ws[o + IZ3 + k] * az
+            alpha = ws[o + D + k] * (rest + ws[o + ROTOR + k] * before)
+            ws[o + ALPHA + k] = alpha
+            ws[o + AR + k] = ar + ws[o + ER + k] * alpha
+            ws[o + AZ + k] = az + ws[o + EZ + k] * alpha
+            joint(ws, o, k, alpha - before, weight, ahead, first, last)
+
+
+def first_stage(ws, n, weight, ahead):
+    """Stage 1, which keeps the state that the step starts from."""
+    stage(ws, n, weight, ahead, True, False)
+
+
+def middle_stage(ws, n, weight, ahead):
+    """Stages 2 and 3."""
+    stage(ws, n, weight, ahead, False, False)
+
+
+def last_stage(ws, n, weight, ahead):
+    """Stage 4, whose next state is the step's end."""
+    stage(ws, n, weight, ahead, False, True)
+
+
+def load(ws, n, start, state, parameters, voltage):
+    """Lanes from arms start, start + 1, ...; lanes past the last arm repeat it and are never stored."""
+    for lane in range(W):
+        arm = min(start + lane, state.shape[0] - 1)
+        for a in range(n):
+            o = U(a * STRIDE + lane)
+            for row in range(3):
+                ws[o + U(row * W)] = state[arm, row, a]
+            for row in range(5):
+                ws[o + ELECTRICAL + U(row * W)] = state[arm, 3 + row, a]
+            ws[o + V] = voltage[arm, a]
+            for row in range(PARAMETER_ROWS):
+                ws[o + LENGTH + U(row * W)] = parameters[arm, row, a]
+        k = U(lane)
+        ws[SPIN + k] = ws[QD + k] * ws[QD + k]
+        ws[YAW + k] = ws[AXIAL + k]
+        ws[LOW + k] = np.inf
+
+
+def unload(ws, tail, n, lane, elbows, out, summary):
+    """Writes a lane back; a state that cannot be represented stays as it was, with VALID at zero."""
+    k = U(lane)
+    valid = True
+    for a in range(n):
+        o = U(a * STRIDE + lane)
+        # Not-a-number and infinity fail the comparison or turn the product into not-a-number.
+        meters = ws[o + ELECTRICAL] + ws[o + COPPER] + ws[o + FRICTION] + ws[o + WORK]
+        valid = valid and abs(ws[o + Q]) + 0.0 * (ws[o + QD] + ws[o + I] + meters) < LARGEST_ANGLE
+    summary[VALID] = 1.0 if valid else 0.0
+    if not valid:
+        return
+    for a in range(n):
+        o = U(a * STRIDE + lane)
+        for row in range(3):
+            out[row, a] = ws[o + U(row * W)]
+        for row in range(5):
+            out[3 + row, a] = ws[o + ELECTRICAL + U(row * W)]
+    end = U((n - 1) * STRIDE) + k
+    s, c = sincos(ws[Q + k])
+    summary[HAND] = ws[end + RHO] * c
+    summary[HAND + 1] = ws[end + RHO] * s
+    summary[HAND + 2] = ws[end + Z]
+    summary[LOWEST] = ws[end + LOW]
+    summary[BELOW_TABLE] += tail[BELOW + k]
+    for j in range(elbows.size):
+        summary[SUMMARY_COLUMNS + j] = tail[FORCES + U(j * W) + k]
+
+
+def advance(state, parameters, voltage, elbows, first, end, n_steps, step, summary):
+    """Arms first..end-1 of the batch, n_steps RK4 steps of `step` seconds under constant voltage, in place.
+
+    state (B, STATE_ROWS, n), parameters (B, PARAMETER_ROWS, n), voltage (B, n), summary (B, SUMMARY_COLUMNS + p).
+    With n_steps = 0 only the summary is refreshed. An arm whose state leaves the representable keeps its old
+    state and summary, with VALID at zero.
+    """
+    n = state.shape[2]
+    ws = np.zeros((n + 1) * STRIDE)
+    tail = np.zeros(TAIL)
+    tip = U((n - 1) * STRIDE)
+    for start in range(first, end, W):
+        load(ws, n, start, state[:end], parameters, voltage)
+        for k in range(LANES):
+            tail[BELOW + k] = 0.0
+        evaluate(ws, tail, n, elbows)
+        for _ in range(n_steps):
+            for k in range(LANES):
+                tail[BELOW + k] += step if ws[tip + LOW + k] < -BELOW_TABLE_TOLERANCE else 0.0
+            first_stage(ws, n, step / 6.0, step / 2.0)
+            evaluate(ws, tail, n, elbows)
+            middle_stage(ws, n, step / 3.0, step / 2.0)
+            evaluate(ws, tail, n, elbows)
+            middle_stage(ws, n, step / 3.0, step)
+            evaluate(ws, tail, n, elbows)
+            last_stage(ws, n, step / 6.0, 0.0)
+            project(ws, tail, elbows)
+            # Its summary is the end of this step, its accelerations the first stage of the next.
+            evaluate(ws, tail, n, elbows)
+        for lane in range(min(W, end - start)):
+            unload(ws, tail, n, lane, elbows, state[start + lane], summary[start + lane])
+
+
+def accelerations(state, parameters, voltage, elbows, q_ddot, current_dot, elbow_force):
+    """Right-hand side of eq. 17 at each arm's state: q_ddot and current_dot (B, n), elbow_force (B, p)."""
+    n = state.shape[2]
+    ws = np.zeros((n + 1) * STRIDE)
+    tail = np.zeros(TAIL)
+    for start in range(0, state.shape[0], W):
+        load(ws, n, start, state, parameters, voltage)
+        evaluate(ws, tail, n, elbows)
+        # The increments of a step of one second are the rates.
+        first_stage(ws, n, 1.0, 0.0)
+        for lane in range(min(W, state.shape[0] - start)):
+            for a in range(n):
+                q_ddot[start + lane, a] = ws[U(a * STRIDE + lane) + QDA]
+                current_dot[start + lane, a] = ws[U(a * STRIDE + lane) + IA]
+            for j in range(elbows.size):
+                elbow_force[start + lane, j] = tail[FORCES + U(j * W + lane)]
+
+
+def settle(q, parameters, elbows):
+    """Moves poses q (B, n) onto the elbows' plane in place, as far as Newton's method gets."""
+    n = q.shape[1]
+    ws = np.zeros((n + 1) * STRIDE)
+    tail = np.zeros(TAIL)
+    for start in range(0, q.shape[0], W):
+        for lane in range(W):
+            arm = min(start + lane, q.shape[0] - 1)
+            for a in range(n):
+                ws[U(a * STRIDE + lane) + Q] = q[arm, a]
+                ws[U(a * STRIDE + lane) + LENGTH] = parameters[arm, 0, a]
+        project(ws, tail, elbows)
+        for lane in range(min(W, q.shape[0] - start)):
+            for a in range(n):
+                q[start + lane, a] = ws[U(a * STRIDE + lane) + Q]
 
 
 class Kernel(NamedTuple):
-    """The compiled functions for one lane count."""
+    """The compiled entries for one lane count."""
 
     advance: Compiled
     accelerations: Compiled
@@ -156,477 +650,23 @@ class Kernel(NamedTuple):
 
 @cache
 def kernel(lanes: int) -> Kernel:
-    """The kernel for blocks of `lanes` arms; compiled at its first call and cached on disk."""
-    W = lanes
-    LANES = U(W)
-    (
-        Q, QD, I, Q0, QD0, I0, QA, QDA, IA, E0, E1, E2, E3, E4, V,
-        LENGTH, MASS, INERTIA, DIFFERENCE, AXIAL, ROTOR, KM, FRICTION, DM, RESISTANCE, LINV, GRAVITY, PAYLOAD,
-        PHI, OMEGA, SIN, COS, SPIN, RHO, RHOD, Z, AVR, AVZ, YAW, YAWD, LOW, ER, EZ, FR, FZ, T,
-        KRR, KRZ, KZZ, KR3, KZ3, K33, BR, BZ, B3, IR3, IZ3, D, R, AR, AZ, ALPHA, QDD,
-        CR, CZ, C3, FREE, GAIN, SPARE, HEIGHT, RATE, GRAM,
-    ) = (U(W * row) for row in range(SLOTS))  # fmt: skip
-    Y = W * SLOTS
-    STRIDE = W * (SLOTS + MAXIMUM_ELBOWS)
-    NEXT = U(STRIDE)
-    # Per-arm rows follow the records: Delassus matrix and elbow forces.
-    FORCE = U(W * MAXIMUM_ELBOWS * MAXIMUM_ELBOWS)
-    TAIL = W * (MAXIMUM_ELBOWS + 1) * MAXIMUM_ELBOWS + W
+    """The entries for blocks of `lanes` arms (a divisor of W), compiled at their first call.
 
-    options: Any = {"cache": True, "nogil": True, "error_model": "numpy"}
-
-    @njit(**options)
-    def pitch(ws, n):
-        """Absolute pitch, its rate, sine and cosine, outward."""
-        for a in range(1, n):
-            o = U(a * STRIDE)
-            for k in range(LANES):
-                phi = ws[o - NEXT + PHI + k] + ws[o + Q + k]
-                s, c = sincos(phi)
-                ws[o + PHI + k] = phi
-                ws[o + OMEGA + k] = ws[o - NEXT + OMEGA + k] + ws[o + QD + k]
-                ws[o + SIN + k] = s
-                ws[o + COS + k] = c
-
-    @njit(**options)
-    def project(ws, elbows):
-        """Newton step of pose and rates onto the elbows' plane, least change of absolute pitch.
-
-        All elbows lie at z = 0, so the links between two neighbours close on their own and no matrix is solved.
-        Once a step is enough there: the drift is the integrator's local error, whose square is below rounding.
-        """
-        first = 1
-        for j in range(elbows.size):
-            last = elbows[j] - 2
-            o = U((first - 1) * STRIDE)
-            for k in range(LANES):
-                ws[o + HEIGHT + k] = 0.0
-                ws[o + RATE + k] = 0.0
-                ws[o + GRAM + k] = 0.0
-            for a in range(first, last + 1):
-                o = U(a * STRIDE)
-                for k in range(LANES):
-                    ls = ws[o + LENGTH + k] * ws[o + SIN + k]
-                    ws[o + HEIGHT + k] = ws[o - NEXT + HEIGHT + k] + ws[o + LENGTH + k] * ws[o + COS + k]
-                    ws[o + RATE + k] = ws[o - NEXT + RATE + k] - ls * ws[o + OMEGA + k]
-                    ws[o + GRAM + k] = ws[o - NEXT + GRAM + k] + ls * ls
-            o = U(last * STRIDE)
-            for k in range(LANES):
-                # A floor far below any real lever arm keeps a straight-up segment finite.
-                scale = 1.0 / (ws[o + GRAM + k] + 1e-12)
-                ws[o + NEXT + HEIGHT + k] = scale * ws[o + HEIGHT + k]
-                ws[o + NEXT + RATE + k] = scale * ws[o + RATE + k]
-            for a in range(last, first - 1, -1):
-                o = U(a * STRIDE)
-                for k in range(LANES):
-                    height = ws[o + NEXT + HEIGHT + k]
-                    rate = ws[o + NEXT + RATE + k]
-                    s = ws[o + SIN + k]
-                    c = ws[o + COS + k]
-                    shift = ws[o + LENGTH + k] * s * height
-                    kick = ws[o + LENGTH + k] * s * rate
-                    ws[o + HEIGHT + k] = height
-                    ws[o + RATE + k] = rate
-                    ws[o + PHI + k] += shift
-                    ws[o + OMEGA + k] += kick
-                    ws[o + SIN + k] = s + shift * (c - 0.5 * shift * s)
-                    ws[o + COS + k] = c - shift * (s + 0.5 * shift * c)
-                    ws[o + Q + k] += shift
-                    ws[o + QD + k] += kick
-                    # The next link keeps its own absolute pitch (or adds its own shift, done before).
-                    ws[o + NEXT + Q + k] -= shift
-                    ws[o + NEXT + QD + k] -= kick
-            first = last + 1
-
-    @njit(**options)
-    def outward(ws, n):
-        """Positions, velocity products, yaw inertia and each link's inertial and gravity force, base to tip."""
-        for k in range(LANES):
-            ws[SPIN + k] = ws[QD + k] * ws[QD + k]
-        for a in range(1, n):
-            o = U(a * STRIDE)
-            for k in range(LANES):
-                s = ws[o + SIN + k]
-                c = ws[o + COS + k]
-                w = ws[o + OMEGA + k]
-                m = ws[o + MASS + k]
-                half = 0.5 * ws[o + LENGTH + k]
-                difference = ws[o + DIFFERENCE + k]
-                spin = ws[o - NEXT + SPIN + k]
-                hs = half * s
-                hc = half * c
-                hw = w * w
-                rho = ws[o - NEXT + RHO + k] + hs
-                rhod = ws[o - NEXT + RHOD + k] + hc * w
-                avr = ws[o - NEXT + AVR + k] - hs * hw
-                avz = ws[o - NEXT + AVZ + k] - hc * hw
-                z = ws[o - NEXT + Z + k] + 2.0 * hc
-                fr = m * (avr - rho * spin)
-                fz = m * (avz + ws[o + GRAVITY + k])
-                dsc = difference * s * c
-                ws[o + SPIN + k] = spin
-                ws[o + RHO + k] = rho + hs
-                ws[o + RHOD + k] = rhod + hc * w
-                ws[o + AVR + k] = avr - hs * hw
-                ws[o + AVZ + k] = avz - hc * hw
-                ws[o + Z + k] = z
-                ws[o + LOW + k] = min(ws[o - NEXT + LOW + k], z)
-                ws[o + YAW + k] = ws[o - NEXT + YAW + k] + m * rho * rho + difference * s * s + ws[o + AXIAL + k]
-                ws[o + YAWD + k] = ws[o - NEXT + YAWD + k] + 2.0 * (m * rho * rhod + dsc * w)
-                ws[o + ER + k] = 2.0 * hc
-                ws[o + EZ + k] = -2.0 * hs
-                ws[o + FR + k] = fr
-                ws[o + FZ + k] = fz
-                ws[o + T + k] = hc * fr - hs * fz - dsc * spin
-
-    @njit(**options)
-    def inward(ws, n):
-        """Articulated inertia K and bias b, tip to base; starts from the payload at the tip."""
-        o = U(n * STRIDE)
-        end = U((n - 1) * STRIDE)
-        for k in range(LANES):
-            load = ws[end + PAYLOAD + k]
-            ws[o + KRR + k] = load
-            ws[o + KRZ + k] = 0.0
-            ws[o + KZZ + k] = load
-            ws[o + KR3 + k] = 0.0
-            ws[o + KZ3 + k] = 0.0
-            ws[o + K33 + k] = 0.0
-            ws[o + BR + k] = load * (ws[end + AVR + k] - ws[end + RHO + k] * ws[end + SPIN + k])
-            ws[o + BZ + k] = load * (ws[end + AVZ + k] + ws[end + GRAVITY + k])
-            ws[o + B3 + k] = 0.0
-        for a in range(n - 1, 0, -1):
-            o = U(a * STRIDE)
-            for k in range(LANES):
-                er = ws[o + ER + k]
-                ez = ws[o + EZ + k]
-                m = ws[o + MASS + k]
-                j = ws[o + ROTOR + k]
-                krr = ws[o + NEXT + KRR + k]
-                krz = ws[o + NEXT + KRZ + k]
-                kzz = ws[o + NEXT + KZZ + k]
-                kr3 = ws[o + NEXT + KR3 + k]
-                kz3 = ws[o + NEXT + KZ3 + k]
-                br = ws[o + NEXT + BR + k]
-                bz = ws[o + NEXT + BZ + k]
-                gr = krr * er + krz * ez + kr3
-                gz = krz * er + kzz * ez + kz3
-                ir3 = 0.5 * m * er + gr
-                iz3 = 0.5 * m * ez + gz
-                i33 = ws[o + INERTIA + k] + er * (gr + kr3) + ez * (gz + kz3) + ws[o + NEXT + K33 + k]
-                u = ws[o + KM + k] * ws[o + I + k] - ws[o + FRICTION + k] * ws[o + QD + k]
-                r = u - (ws[o + T + k] + er * br + ez * bz + ws[o + NEXT + B3 + k])
-                d = 1.0 / (i33 + j)
-                dj = d * j
-                dr = d * r
-                ws[o + IR3 + k] = ir3
-                ws[o + IZ3 + k] = iz3
-                ws[o + D + k] = d
-                ws[o + R + k] = r
-                ws[o + KRR + k] = m + krr - d * ir3 * ir3
-                ws[o + KRZ + k] = krz - d * ir3 * iz3
-                ws[o + KZZ + k] = m + kzz - d * iz3 * iz3
-                ws[o + KR3 + k] = dj * ir3
-                ws[o + KZ3 + k] = dj * iz3
-                ws[o + K33 + k] = j - j * dj
-                ws[o + BR + k] = ws[o + FR + k] + br + dr * ir3
-                ws[o + BZ + k] = ws[o + FZ + k] + bz + dr * iz3
-                ws[o + B3 + k] = u - j * dr
-
-    @njit(**options)
-    def solve(tail, p):
-        """Elbow forces -W^-1 f in place of f, by Cholesky W = L L^T in place; the diagonal then holds 1 / L_jj."""
-        for j in range(p):
-            row = U(j * MAXIMUM_ELBOWS * W)
-            force = FORCE + U(j * W)
-            diagonal = row + U(j * W)
-            for i in range(j):
-                other = U(i * MAXIMUM_ELBOWS * W)
-                entry = row + U(i * W)
-                for m in range(i):
-                    for k in range(LANES):
-                        tail[entry + k] -= tail[row + U(m * W) + k] * tail[other + U(m * W) + k]
-                for k in range(LANES):
-                    tail[entry + k] *= tail[other + U(i * W) + k]
-            for m in range(j):
-                for k in range(LANES):
-                    lower = tail[row + U(m * W) + k]
-                    tail[diagonal + k] -= lower * lower
-                    tail[force + k] -= lower * tail[FORCE + U(m * W) + k]
-            for k in range(LANES):
-                # Elbows that cannot move against each other leave nothing to solve for: the floor keeps that finite.
-                inverse = 1.0 / np.sqrt(max(tail[diagonal + k], 1e-12))
-                tail[diagonal + k] = inverse
-                tail[force + k] *= inverse
-        for j in range(p - 1, -1, -1):
-            force = FORCE + U(j * W)
-            diagonal = U((j * MAXIMUM_ELBOWS + j) * W)
-            for m in range(j + 1, p):
-                entry = U((m * MAXIMUM_ELBOWS + j) * W)
-                for k in range(LANES):
-                    # Forces already solved carry their final minus sign.
-                    tail[force + k] += tail[entry + k] * tail[FORCE + U(m * W) + k]
-            for k in range(LANES):
-                tail[force + k] *= -tail[diagonal + k]
-
-    @njit(**options)
-    def brace(ws, tail, elbows):
-        """Elbow forces: f = -W^-1 z_ddot_free, with W = sum of d y y^T and z_ddot_free = sum of d y r + J_dot q_dot.
-
-        y is the recursion's answer to a unit +z force at an elbow; the forces then add sum of y f to r.
-        """
-        p = elbows.size
-        for j in range(p):
-            last = elbows[j] - 2
-            y_slot = U(Y + j * W)
-            o = U((last + 1) * STRIDE)
-            for k in range(LANES):
-                ws[o + CR + k] = 0.0
-                ws[o + CZ + k] = -1.0
-                ws[o + C3 + k] = 0.0
-                ws[o + FREE + k] = 0.0
-                ws[o + GAIN + k] = 0.0
-            for a in range(last, 0, -1):
-                o = U(a * STRIDE)
-                for k in range(LANES):
-                    cr = ws[o + NEXT + CR + k]
-                    cz = ws[o + NEXT + CZ + k]
-                    y = -(ws[o + ER + k] * cr + ws[o + EZ + k] * cz + ws[o + NEXT + C3 + k])
-                    dy = ws[o + D + k] * y
-                    ws[o + CR + k] = cr + dy * ws[o + IR3 + k]
-                    ws[o + CZ + k] = cz + dy * ws[o + IZ3 + k]
-                    ws[o + C3 + k] = -ws[o + ROTOR + k] * dy
-                    ws[o + FREE + k] = ws[o + NEXT + FREE + k] + dy * ws[o + R + k]
-                    ws[o + GAIN + k] = ws[o + NEXT + GAIN + k] + dy * y
-                    ws[o + y_slot + k] = y
-            row = U(j * MAXIMUM_ELBOWS * W)
-            drift = U(last * STRIDE)
-            one = U(STRIDE)
-            for k in range(LANES):
-                tail[row + U(j * W) + k] = ws[one + GAIN + k]
-                tail[FORCE + U(j * W) + k] = ws[one + FREE + k] + ws[drift + AVZ + k]
-            for i in range(j):
-                other = U(Y + i * W)
-                o = U((elbows[i] - 1) * STRIDE)
-                for k in range(LANES):
-                    ws[o + GAIN + k] = 0.0
-                for a in range(elbows[i] - 2, 0, -1):
-                    o = U(a * STRIDE)
-                    for k in range(LANES):
-                        ws[o + GAIN + k] = (
-                            ws[o + NEXT + GAIN + k] + ws[o + D + k] * ws[o + y_slot + k] * ws[o + other + k]
-                        )
-                for k in range(LANES):
-                    tail[row + U(i * W) + k] = ws[one + GAIN + k]
-        solve(tail, p)
-        for j in range(p):
-            y_slot = U(Y + j * W)
-            for k in range(LANES):
-                ws[SPARE + k] = tail[FORCE + U(j * W) + k]
-            for a in range(1, elbows[j] - 1):
-                o = U(a * STRIDE)
-                for k in range(LANES):
-                    force = ws[o - NEXT + SPARE + k]
-                    ws[o + SPARE + k] = force
-                    ws[o + R + k] += ws[o + y_slot + k] * force
-
-    @njit(**options)
-    def forward(ws, n):
-        """Joint accelerations, base to tip; the yaw stands alone."""
-        end = U((n - 1) * STRIDE)
-        for k in range(LANES):
-            load = ws[end + PAYLOAD + k]
-            inertia = ws[end + YAW + k] + load * ws[end + RHO + k] * ws[end + RHO + k] + ws[ROTOR + k]
-            rate = ws[end + YAWD + k] + 2.0 * load * ws[end + RHO + k] * ws[end + RHOD + k]
-            u = ws[KM + k] * ws[I + k] - ws[FRICTION + k] * ws[QD + k]
-            ws[QDD + k] = (u - rate * ws[QD + k]) / inertia
-        for a in range(1, n):
-            o = U(a * STRIDE)
-            for k in range(LANES):
-                ar = ws[o - NEXT + AR + k]
-                az = ws[o - NEXT + AZ + k]
-                before = ws[o - NEXT + ALPHA + k]
-                alpha = ws[o + D + k] * (
-                    ws[o + R + k] + ws[o + ROTOR + k] * before - ws[o + IR3 + k] * ar - ws[o + IZ3 + k] * az
-                )
-                ws[o + ALPHA + k] = alpha
-                ws[o + AR + k] = ar + ws[o + ER + k] * alpha
-                ws[o + AZ + k] = az + ws[o + EZ + k] * alpha
-                ws[o + QDD + k] = alpha - before
-
-    @njit(**options)
-    def evaluate(ws, tail, n, elbows):
-        outward(ws, n)
-        inward(ws, n)
-        brace(ws, tail, elbows)
-        forward(ws, n)
-
-    @njit(**options)
-    def stage(ws, n, weight, ahead, last):
-        """Adds one RK4 stage to the step's increments and meters, and sets the state of the next stage."""
-        for a in range(n):
-            o = U(a * STRIDE)
-            for k in range(LANES):
-                q_dot = ws[o + QD + k]
-                q_ddot = ws[o + QDD + k]
-                i = ws[o + I + k]
-                v = ws[o + V + k]
-                resistance = ws[o + RESISTANCE + k]
-                km = ws[o + KM + k]
-                i_dot = (v - resistance * i - km * q_dot) * ws[o + LINV + k]
-                power = v * i
-                torque = km * i - ws[o + ROTOR + k] * q_ddot - ws[o + DM + k] * q_dot
-                ws[o + E0 + k] += weight * power
-                ws[o + E1 + k] += weight * max(power, 0.0)
-                ws[o + E2 + k] += weight * (resistance * i * i)
-                ws[o + E3 + k] += weight * (ws[o + FRICTION + k] * q_dot * q_dot)
-                ws[o + E4 + k] += weight * (torque * q_dot)
-                qa = ws[o + QA + k] + weight * q_dot
-                qda = ws[o + QDA + k] + weight * q_ddot
-                ia = ws[o + IA + k] + weight * i_dot
-                ws[o + QA + k] = qa
-                ws[o + QDA + k] = qda
-                ws[o + IA + k] = ia
-                ws[o + Q + k] = ws[o + Q0 + k] + (qa if last else ahead * q_dot)
-                ws[o + QD + k] = ws[o + QD0 + k] + (qda if last else ahead * q_ddot)
-                ws[o + I + k] = ws[o + I0 + k] + (ia if last else ahead * i_dot)
-
-    @njit(**options)
-    def begin(ws, n):
-        """The current state becomes the start of a step."""
-        for a in range(n):
-            o = U(a * STRIDE)
-            for k in range(LANES):
-                ws[o + Q0 + k] = ws[o + Q + k]
-                ws[o + QD0 + k] = ws[o + QD + k]
-                ws[o + I0 + k] = ws[o + I + k]
-                ws[o + QA + k] = 0.0
-                ws[o + QDA + k] = 0.0
-                ws[o + IA + k] = 0.0
-
-    @njit(**options)
-    def load(ws, n, start, state, parameters, voltage):
-        """Lanes from arms start, start + 1, ...; lanes past the last arm repeat it and are never stored."""
-        for lane in range(W):
-            k = U(lane)
-            b = min(start + lane, state.shape[0] - 1)
-            for a in range(n):
-                o = U(a * STRIDE + lane)
-                for row in range(3):
-                    ws[o + U(row * W)] = state[b, row, a]
-                for row in range(5):
-                    ws[o + E0 + U(row * W)] = state[b, 3 + row, a]
-                for row in range(PARAMETER_ROWS):
-                    ws[o + LENGTH + U(row * W)] = parameters[b, row, a]
-                ws[o + V] = voltage[b, a]
-            ws[YAW + k] = ws[AXIAL + k]
-            ws[LOW + k] = np.inf
-
-    @njit(**options)
-    def summarise(ws, tail, n, k, elbows, out):
-        o = U((n - 1) * STRIDE) + k
-        s, c = sincos(ws[Q + k])
-        out[HAND] = ws[o + RHO] * c
-        out[HAND + 1] = ws[o + RHO] * s
-        out[HAND + 2] = ws[o + Z]
-        out[LOWEST] = ws[o + LOW]
-        for j in range(elbows.size):
-            out[SUMMARY_COLUMNS + j] = tail[FORCE + U(j * W) + k]
-
-    @njit(**options)
-    def advance(state, parameters, voltage, elbows, first, end, n_steps, step, summary):
-        """Arms first..end-1 of the batch, n_steps RK4 steps of `step` seconds under constant voltage, in place.
-
-        state (B, STATE_ROWS, n), parameters (B, PARAMETER_ROWS, n), voltage (B, n), summary (B, SUMMARY_COLUMNS + p).
-        With n_steps = 0 only the summary is refreshed. An arm whose state leaves the representable keeps its old
-        state and summary, with VALID at zero.
-        """
-        n = state.shape[2]
-        ws = np.zeros((n + 1) * STRIDE)
-        tail = np.zeros(TAIL)
-        below = U(TAIL - W)
-        for start in range(first, end, W):
-            load(ws, n, start, state[:end], parameters, voltage)
-            for k in range(LANES):
-                tail[below + k] = 0.0
-            pitch(ws, n)
-            evaluate(ws, tail, n, elbows)
-            for _ in range(n_steps):
-                o = U((n - 1) * STRIDE)
-                for k in range(LANES):
-                    tail[below + k] += 1.0 if ws[o + LOW + k] < -BELOW_TABLE_TOLERANCE else 0.0
-                begin(ws, n)
-                stage(ws, n, step / 6.0, step / 2.0, False)
-                pitch(ws, n)
-                evaluate(ws, tail, n, elbows)
-                stage(ws, n, step / 3.0, step / 2.0, False)
-                pitch(ws, n)
-                evaluate(ws, tail, n, elbows)
-                stage(ws, n, step / 3.0, step, False)
-                pitch(ws, n)
-                evaluate(ws, tail, n, elbows)
-                stage(ws, n, step / 6.0, 0.0, True)
-                pitch(ws, n)
-                project(ws, elbows)
-                evaluate(ws, tail, n, elbows)
-            for lane in range(min(W, end - start)):
-                b = start + lane
-                k = U(lane)
-                valid = True
-                for a in range(n):
-                    o = U(a * STRIDE + lane)
-                    # Not-a-number and infinity fail the comparison or turn the product into not-a-number.
-                    rest = 0.0 * (ws[o + QD] + ws[o + I] + ws[o + E0] + ws[o + E2] + ws[o + E3] + ws[o + E4])
-                    valid = valid and abs(ws[o + Q]) + rest < LARGEST_ANGLE
-                summary[b, VALID] = 1.0 if valid else 0.0
-                if not valid:
-                    continue
-                for a in range(n):
-                    o = U(a * STRIDE + lane)
-                    for row in range(3):
-                        state[b, row, a] = ws[o + U(row * W)]
-                    for row in range(5):
-                        state[b, 3 + row, a] = ws[o + E0 + U(row * W)]
-                summarise(ws, tail, n, k, elbows, summary[b])
-                summary[b, BELOW_TABLE] += step * tail[below + k]
-
-    @njit(**options)
-    def accelerations(state, parameters, voltage, elbows, q_ddot, current_dot, elbow_force):
-        """Right-hand side of eq. 17 at each arm's state: q_ddot and current_dot (B, n), elbow_force (B, p)."""
-        n = state.shape[2]
-        ws = np.zeros((n + 1) * STRIDE)
-        tail = np.zeros(TAIL)
-        for start in range(0, state.shape[0], W):
-            load(ws, n, start, state, parameters, voltage)
-            pitch(ws, n)
-            evaluate(ws, tail, n, elbows)
-            for lane in range(min(W, state.shape[0] - start)):
-                b = start + lane
-                for a in range(n):
-                    o = U(a * STRIDE + lane)
-                    q_ddot[b, a] = ws[o + QDD]
-                    current_dot[b, a] = (ws[o + V] - ws[o + RESISTANCE] * ws[o + I] - ws[o + KM] * ws[o + QD]) * ws[
-                        o + LINV
-                    ]
-                for j in range(elbows.size):
-                    elbow_force[b, j] = tail[FORCE + U(j * W + lane)]
-
-    @njit(**options)
-    def settle(q, parameters, elbows, iterations):
-        """Moves poses q (B, n) onto the elbows' plane in place by `iterations` Newton steps."""
-        n = q.shape[1]
-        ws = np.zeros((n + 1) * STRIDE)
-        for start in range(0, q.shape[0], W):
-            for lane in range(W):
-                b = min(start + lane, q.shape[0] - 1)
-                for a in range(n):
-                    ws[U(a * STRIDE + lane) + Q] = q[b, a]
-                    ws[U(a * STRIDE + lane) + LENGTH] = parameters[b, 0, a]
-            for _ in range(iterations):
-                pitch(ws, n)
-                project(ws, elbows)
-            for lane in range(min(W, q.shape[0] - start)):
-                for a in range(n):
-                    q[start + lane, a] = ws[U(a * STRIDE + lane) + Q]
-
-    return Kernel(advance, accelerations, settle)
+    The functions above are templates: each lane count gets its own copy, whose globals are its own row offsets and its
+    own compiled callees. Closures would do the same, but Numba's disk cache never recognises a closure over compiled
+    functions. Only the entries are cached; what they call is compiled into them.
+    """
+    space = dict(globals())
+    space.update({name: type(space[name])(int(space[name]) * lanes // W) for name in SCALED})
+    templates = (
+        sincos, newton, project, outward, inward, solve, brace, evaluate, joint, stage, first_stage, middle_stage,
+        last_stage, load, unload, advance, accelerations, settle,
+    )  # fmt: skip
+    for template in templates:
+        name = template.__name__
+        copy = FunctionType(template.__code__, space, f"{name}_{lanes}")
+        copy.__qualname__ = copy.__name__
+        space[name] = njit(nogil=True, error_model="numpy", cache=name in Kernel._fields, forceinline=name in INLINED)(
+            copy
+        )
+    return Kernel(*(space[name] for name in Kernel._fields))

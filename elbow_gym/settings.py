@@ -56,6 +56,8 @@ class Settings:
                 raise ValueError(f"{name} must be one of {allowed}, got {getattr(self, name)!r}")
         if not isinstance(self.regeneration, bool):
             raise ValueError(f"regeneration must be True or False, got {self.regeneration!r}")
+        if not math.isfinite(self.duration * self.control_frequency):
+            raise ValueError(f"duration must be a countable number of control periods, got {self.duration}")
         if self.horizon < 1:
             raise ValueError(
                 f"duration must be at least one control period ({1 / self.control_frequency:g} s), got {self.duration}"

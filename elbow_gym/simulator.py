@@ -14,41 +14,19 @@ from numpy.typing import ArrayLike, NDArray
 from elbow_gym import kernel
 from elbow_gym.kinematics import constraint_jacobian, elbow_heights
 from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows, positive
+from elbow_gym.tables import parameter_table
 
 # Explicit RK4 is stable up to 2.785 / rate; the fastest rate of this family is the armature's R / L.
 STABILITY_LIMIT = 2.7
 # A given state may be off the elbows' plane by this much [m, m/s].
 PLANE_TOLERANCE = 1e-8
-# Newton steps onto the plane; a fixed number, so that an arm's bits do not depend on its neighbours.
-SETTLING_STEPS = 30
-
-
-def parameter_table(arm: ArmParameters, payload: float = 0.0) -> Array:
-    """The kernel's parameter rows of one arm, shape (PARAMETER_ROWS, n)."""
-    one = np.ones(arm.n_joints)
-    mass, length = arm.of_links("mass"), arm.of_links("length")
-    transverse, axial = arm.of_links("transverse_inertia"), arm.of_links("axial_inertia")
-    motor_friction = arm.of_motors("reflected_viscous_friction")
-    rows = {
-        "length": length,
-        "mass": mass,
-        "end_inertia": transverse + mass * length**2 / 4.0,
-        "inertia_difference": transverse - axial,
-        "axial_inertia": axial,
-        "reflected_inertia": arm.of_motors("reflected_inertia"),
-        "joint_torque_constant": arm.of_motors("joint_torque_constant"),
-        "friction": np.array(arm.joint_viscous_friction) + motor_friction,
-        "reflected_viscous_friction": motor_friction,
-        "armature_resistance": arm.of_motors("armature_resistance"),
-        "inverse_inductance": 1.0 / arm.of_motors("armature_inductance"),
-        "gravity": arm.gravity * one,
-        "payload": payload * one,
-    }
-    return np.stack([rows[name] for name in kernel.PARAMETERS])
 
 
 def _batch(name: str, value: ArrayLike, shape: tuple[int, int]) -> Array:
-    array = np.asarray(value, dtype=np.float64)
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be numbers of shape {shape} or {shape[1:]}, got {value!r}") from error
     if array.shape not in (shape, shape[1:]):
         raise ValueError(f"{name} must have shape {shape} or {shape[1:]}, got {array.shape}")
     if not np.isfinite(array).all():
@@ -99,13 +77,25 @@ class Simulator:
         self._summary = np.zeros((self.num_envs, kernel.SUMMARY_COLUMNS + len(self.elbows)))
         self._parameters = np.repeat(parameter_table(self.arm)[None], self.num_envs, axis=0)
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
+        self._num_threads = int(num_threads)
+        self._attach()
+
+    def _attach(self) -> None:
         # Up to two arms the lanes of a block would mostly idle.
         lanes = 1 if self.num_envs <= 2 else kernel.BLOCK_LANES
         self._advance, _, self._settle = kernel.kernel(lanes)
         blocks = -(-self.num_envs // lanes)
-        edges = np.linspace(0, blocks, min(int(num_threads), blocks) + 1).round().astype(int) * lanes
+        edges = np.linspace(0, blocks, min(self._num_threads, blocks) + 1).round().astype(int) * lanes
         self._shares = [(int(a), min(int(b), self.num_envs)) for a, b in itertools.pairwise(edges)]
         self._pool = ThreadPoolExecutor(len(self._shares)) if len(self._shares) > 1 else None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the compiled functions and the threads, for pickling and copying."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("_advance", "_settle", "_pool")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._attach()
 
     def reset(
         self,
@@ -139,7 +129,7 @@ class Simulator:
         """
         settled = _batch("q", q, (self.num_envs, self.arm.n_joints)).copy()
         if self.elbows:
-            self._settle(settled, self._parameters, self._elbow_index, SETTLING_STEPS)
+            self._settle(settled, self._parameters, self._elbow_index)
             if not (np.abs(settled).max() < kernel.LARGEST_ANGLE):
                 raise ValueError(f"q must be near a pose with the elbows {self.elbows} at z = 0, got {q!r}")
             self._check_on_table(settled, np.zeros_like(settled))
@@ -161,6 +151,8 @@ class Simulator:
         chosen = np.ones(self.num_envs, dtype=np.bool_) if mask is None else np.asarray(mask, dtype=np.bool_)
         if chosen.shape != (self.num_envs,):
             raise ValueError(f"mask must have shape {(self.num_envs,)}, got {chosen.shape}")
+        if np.abs(q).max() >= kernel.LARGEST_ANGLE:
+            raise ValueError(f"q must be within {kernel.LARGEST_ANGLE:g} rad, got {np.abs(q).max():g}")
         if self.elbows:
             self._check_on_table(q[chosen], q_dot[chosen])
         return q, q_dot, current, chosen

@@ -46,6 +46,9 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
     ) -> None:
         if render_mode is not None:
             raise ValueError(f"render_mode must be one of {self.metadata['render_modes']} or None, got {render_mode!r}")
+        modes = [mode.value for mode in AutoresetMode]
+        if autoreset_mode not in [*AutoresetMode, *modes]:
+            raise ValueError(f"autoreset_mode must be one of {modes}, got {autoreset_mode!r}")
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self._episodes = Episodes(Settings(elbows=elbows, arm=arm, **settings), num_envs, num_threads)
         self.num_envs = num_envs
@@ -62,6 +65,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         self._generators: list[np.random.Generator] = []
         self._seeds: list[int] = []
         self._over = np.zeros(num_envs, dtype=np.bool_)
+        self._started = np.zeros(num_envs, dtype=np.bool_)
 
     @property
     def settings(self) -> Settings:
@@ -142,10 +146,11 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             self._seed(seed, chosen)
             rest = {key: value for key, value in options.items() if key != "reset_mask"}
             self._episodes.reset(self._generators, chosen, rest)
-        except ValueError:
+        except (ValueError, gym.error.Error):
             self._generators, self._seeds = before
             raise
         self._over[chosen] = False
+        self._started[chosen] = True
         sight = self._episodes.look()
         return sight.observation, masked(self._episodes.info(sight), chosen)
 
@@ -153,8 +158,10 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         self, actions: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
         """One control period of every arm. Raises ValueError, with the state untouched, on a wrong shape or NaN."""
-        if not self._generators:
-            raise gym.error.ResetNeeded("reset must be called before step")
+        if not self._started.all():
+            raise gym.error.ResetNeeded(
+                f"reset must be called before step, got arms {np.flatnonzero(~self._started)} never reset"
+            )
         array = as_action(actions, (self.num_envs, self._episodes.arm.n_joints))
         waiting = self._over
         if self.autoreset_mode is AutoresetMode.DISABLED and waiting.any():
@@ -203,11 +210,12 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             "episodes": self._episodes.get_state(),
             "generators": [generator.bit_generator.state for generator in self.np_random],
             "over": self._over.copy(),
+            "started": self._started.copy(),
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Takes a state of `get_state`; the continued run is bit-identical."""
-        for name in ("episodes", "generators", "over"):
+        for name in ("episodes", "generators", "over", "started"):
             if name not in state:
                 raise ValueError(f"state must have the entry {name!r}, got {sorted(state)}")
         if len(state["generators"]) != self.num_envs:
@@ -216,6 +224,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         for generator, saved in zip(self.np_random, state["generators"], strict=True):
             generator.bit_generator.state = saved
         self._over = np.array(state["over"], dtype=np.bool_)
+        self._started = np.array(state["started"], dtype=np.bool_)
 
 
 def spread(mask: Flags, rows: Array) -> Flags:

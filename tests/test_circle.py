@@ -1,0 +1,153 @@
+import math
+
+import numpy as np
+import pytest
+
+from elbow_gym import ArmParameters, Circle, LinkParameters, MotorParameters, paper_arm
+from elbow_gym.circle import as_circle, as_phase, check_reachable, reach_shortfall
+
+CENTER = np.array([1.5, 1.5, 0.4])
+OUTWARD = np.array([1.0, 1.0, 0.0]) / math.sqrt(2.0)
+AXES = {
+    "xy": ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
+    "xz": ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]),
+    "yz": ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]),
+    "radial": (OUTWARD, [0.0, 0.0, 1.0]),
+}
+
+
+def at(circle, time, phase=0.0):
+    return circle.position(circle.angle(time, phase))
+
+
+def test_papers_circle_starts_at_its_x_side_and_turns_counterclockwise_seen_from_above():
+    circle = Circle()
+    expected = [(1.6, 1.5, 0.4), (1.5, 1.6, 0.4), (1.4, 1.5, 0.4), (1.5, 1.4, 0.4), (1.6, 1.5, 0.4)]
+    np.testing.assert_allclose(at(circle, [0.0, 1.25, 2.5, 3.75, 5.0]), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("direction", ["counterclockwise", "clockwise"])
+@pytest.mark.parametrize("plane", AXES)
+def test_angle_grows_from_the_planes_first_axis_to_its_second(plane, direction):
+    circle = Circle(plane=plane, direction=direction, radius=0.2, period=4.0)
+    first, second = np.array(AXES[plane])
+    sign = 1.0 if direction == "counterclockwise" else -1.0
+    np.testing.assert_allclose(at(circle, 0.0), CENTER + 0.2 * first, atol=1e-15)
+    np.testing.assert_allclose(at(circle, 1.0), CENTER + sign * 0.2 * second, atol=1e-15)
+    np.testing.assert_allclose(at(circle, 0.0, phase=math.pi / 2), CENTER + 0.2 * second, atol=1e-15)
+
+
+@pytest.mark.parametrize("direction", ["counterclockwise", "clockwise"])
+@pytest.mark.parametrize("plane", AXES)
+def test_velocity_is_the_derivative_of_position(plane, direction):
+    circle = Circle(plane=plane, direction=direction, center=(0.3, -1.2, 0.5), radius=0.15, period=3.0)
+    time, h = np.linspace(0.0, 3.0, 17), 1e-5
+    slope = (at(circle, time + h, 0.7) - at(circle, time - h, 0.7)) / (2.0 * h)
+    np.testing.assert_allclose(circle.velocity(circle.angle(time, 0.7)), slope, atol=1e-9)
+
+
+def test_path_holds_centre_cosine_and_sine_rows():
+    angle = np.linspace(-3.0, 9.0, 7)
+    rows = np.stack([np.ones(7), np.cos(angle), np.sin(angle)], axis=1)
+    circle = Circle(plane="radial")
+    np.testing.assert_allclose(circle.position(angle), rows @ circle.path, atol=1e-15)
+
+
+def test_position_keeps_the_angles_shape():
+    assert Circle().position(0.3).shape == (3,)
+    assert Circle().position(np.zeros((4, 2))).shape == (4, 2, 3)
+
+
+def test_radial_circle_about_the_yaw_axis_lies_in_the_xz_plane():
+    circle = Circle(plane="radial", center=(0.0, 0.0, 1.0))
+    np.testing.assert_allclose(circle.position(0.0), [0.1, 0.0, 1.0], atol=1e-15)
+
+
+def test_dict_form_is_json_and_its_own_inverse():
+    circle = Circle(center=(1.0, 1.2, 0.3), radius=0.2, period=2.0, plane="yz", phase="random", direction="clockwise")
+    assert Circle.from_dict(circle.to_dict()) == circle
+    assert circle.to_dict()["center"] == [1.0, 1.2, 0.3]
+    assert as_circle(None) == as_circle({}) == as_circle(Circle()) == Circle()
+
+
+@pytest.mark.parametrize(
+    ("entry", "rule"),
+    [
+        ({"radius": 0.0}, "circle radius must be positive, got 0.0"),
+        ({"radius": "big"}, "circle radius must be a number, got 'big'"),
+        ({"period": -5.0}, "circle period must be positive, got -5.0"),
+        ({"period": math.inf}, "circle period must be finite, got inf"),
+        ({"center": (1.0, 2.0)}, r"circle center must have three coordinates, got \(1.0, 2.0\)"),
+        ({"center": "abc"}, "circle center must have three coordinates, got 'abc'"),
+        ({"center": (1.0, math.nan, 0.0)}, r"circle center must be finite, got \(1.0, nan, 0.0\)"),
+        ({"center": ("far", 0.0, 0.0)}, r"circle center must .*, got .*'far'.*"),
+        ({"center": (None, 0.0, 0.0)}, r"circle center must .*, got .*None.*"),
+        ({"plane": "zx"}, r"circle plane must be one of .*, got 'zx'"),
+        ({"direction": "left"}, "circle direction must be one of .*, got 'left'"),
+        ({"phase": "late"}, "circle phase must be an angle in rad or \"random\", got 'late'"),
+        ({"phase": math.nan}, "phase must be finite, got nan"),
+        ({"phase": None}, "phase must be an angle in rad, got None"),
+        ({"colour": 1.0}, "circle must have only the entries .*, got 'colour'"),
+    ],
+)
+def test_wrong_entry_is_a_value_error_naming_argument_rule_and_value(entry, rule):
+    with pytest.raises(ValueError, match=f"^{rule}$"):
+        as_circle(entry)
+
+
+def test_circle_of_another_type_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"^circle must be a dict of its fields or None, got 3.0$"):
+        as_circle(3.0)
+
+
+@pytest.mark.parametrize("value", [True, "random", math.inf])
+def test_phase_must_be_a_finite_number(value):
+    with pytest.raises(ValueError, match=f"^phase must .*, got {value!r}$"):
+        as_phase(value)
+
+
+@pytest.mark.parametrize("phase", [-1e6, 1e12, 1e300])
+def test_a_phase_of_any_size_puts_the_target_on_the_circle(phase):
+    circle = Circle(phase=phase)
+    assert np.linalg.norm(at(circle, 0.3, circle.phase) - CENTER) == pytest.approx(0.1, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("elbows", "point", "shortfall"),
+    [
+        # Nine links of 0.3 m reach 2.7 m. Elbows at joint 4 or 7 leave 0.6 or 1.5 m on the table, 2.1 or 1.2 m free.
+        ((), (3.0, 0.0, 0.0), 0.3),
+        ((), (0.0, 0.0, 1.5), -1.2),
+        ((4,), (3.0, 0.0, 0.0), 0.3),
+        ((4,), (0.0, 0.0, 2.5), 0.4),
+        ((4, 7), (0.0, -3.0, 0.0), 0.3),
+        ((4, 7), (0.3, 0.4, 1.3), 0.1),
+        ((4, 7), (2.4, 0.0, 1.2), 0.3),
+    ],
+)
+def test_reach_is_the_table_part_along_the_table_and_the_rest_from_its_end(elbows, point, shortfall):
+    assert reach_shortfall(paper_arm(), elbows, point) == pytest.approx(shortfall, abs=1e-12)
+
+
+def test_a_link_longer_than_the_others_together_leaves_a_hole_around_the_base():
+    arm = ArmParameters(
+        links=(LinkParameters(length=0.0), LinkParameters(length=1.0), LinkParameters(length=0.2)),
+        motors=(MotorParameters(),) * 3,
+        joint_viscous_friction=(0.5,) * 3,
+        nominal_pose=(0.0, 0.5, 0.5),
+    )
+    points = [(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.0, 0.9), (0.0, 1.5, 0.0)]
+    np.testing.assert_allclose(reach_shortfall(arm, (), points), [0.8, 0.3, -0.1, 0.3], atol=1e-12)
+
+
+def test_unreachable_circle_says_which_point_and_by_how_much():
+    # The farthest point is 5.1 m away, the arm is 2.7 m long.
+    with pytest.raises(ValueError, match=r"^circle must lie within .* \(5\.1, 0\.0, 0\.0\) 2\.4 m outside$"):
+        check_reachable(paper_arm(), (), Circle(center=(5.0, 0.0, 0.0)))
+
+
+def test_elbows_bring_a_circle_above_them_out_of_reach():
+    circle = Circle(center=(0.5, 0.0, 2.0))
+    check_reachable(paper_arm(), (), circle)
+    with pytest.raises(ValueError, match=r"2.0\) 0\.8 m outside"):
+        check_reachable(paper_arm(), (4, 7), circle)

@@ -1,0 +1,98 @@
+"""Metrics by hand on a run that can be worked out on paper."""
+
+import numpy as np
+import pytest
+
+from agents.metrics import REGIMES, UNITS, joint_energies, metrics
+from agents.pd import PDController
+from agents.recording import Recording, record
+from elbow_gym.settings import Settings
+
+
+def hand_made(energy_weight=0.001):
+    """One arm of two joints' worth of meters, 50 Hz, 0.1 s, hand 3 mm beside and 4 mm under the target."""
+    time = np.arange(6) * 0.02
+    target = np.zeros((6, 1, 3))
+    hand = target + np.array([0.003, 0.0, -0.004])
+    power = np.array([2.0, -1.0])  # W, constant
+    energy = time[:, None, None] * power
+    zeros = np.zeros((6, 1, 2))
+    voltage = zeros.copy()
+    voltage[4, 0, 1] = -12.0
+    return Recording(
+        settings=Settings(duration=0.1, energy_weight=energy_weight),
+        seeds=(0,),
+        time=time,
+        q=zeros,
+        hand=hand,
+        target=target,
+        electrical_energy=energy,
+        drawn_energy=np.maximum(energy, 0.0),
+        copper_loss=zeros,
+        link_work=zeros,
+        elbow_force=np.array([3.0, 2.0, -1.0, 4.0, 5.0, 6.0]).reshape(6, 1, 1),
+        below_table=time[:, None],
+        voltage=voltage,
+        current=zeros,
+    )
+
+
+def test_metrics_of_a_hand_made_run():
+    found = metrics(hand_made())
+    expected = {
+        "electrical_energy": 0.1,
+        "drawn_energy": 0.2,
+        "error_rms": 5.0,
+        "error_max": 5.0,
+        "z_rms": 4.0,
+        "peak_voltage": 12.0,
+        "smallest_elbow_force": -1.0,
+        "below_table": 0.1,
+        "return": -(5 * 0.005 + 5 * 0.001 * 1.0),
+    }
+    for name, value in expected.items():
+        np.testing.assert_allclose(found[name], [value], rtol=1e-12, err_msg=name)
+
+
+def test_counting_later_counts_less():
+    found = metrics(hand_made(), since=0.06)
+    np.testing.assert_allclose(found["electrical_energy"], 0.04)
+    np.testing.assert_allclose(found["below_table"], 0.04)
+    np.testing.assert_allclose(found["smallest_elbow_force"], 4.0)
+    np.testing.assert_allclose(joint_energies(hand_made(), 0.06), [[0.08, -0.04]])
+
+
+@pytest.mark.parametrize("since", [-0.1, 0.1, 2.0])
+def test_counting_from_outside_the_run_is_refused(since):
+    with pytest.raises(ValueError, match=f"since must lie in .*got {since}"):
+        metrics(hand_made(), since)
+
+
+def test_every_metric_has_a_unit_and_every_regime_a_meaning():
+    assert set(metrics(hand_made())) == set(UNITS)
+    assert [regime.name for regime in REGIMES] == ["A", "B", "C"]
+
+
+def test_recorded_return_is_the_sum_of_rewards():
+    settings = Settings(duration=0.4)
+    recording = record(settings, PDController, [3, 4])
+    from elbow_gym.vector_env import ElbowArmVectorEnv
+
+    env = ElbowArmVectorEnv(2, duration=0.4, autoreset_mode="Disabled")
+    observation, _ = env.reset(seed=[3, 4])
+    controller, total = PDController(env), np.zeros(2)
+    for _ in range(settings.horizon):
+        observation, reward, _, _, info = env.step(controller.predict(observation)[0])
+        total += reward
+    np.testing.assert_allclose(metrics(recording)["return"], total, rtol=1e-12)
+    np.testing.assert_allclose(metrics(recording)["electrical_energy"], info["electrical_energy"], rtol=1e-12)
+
+
+def test_thinned_recording_keeps_energies_and_the_largest_voltage():
+    settings = Settings(duration=0.4, control_frequency=500.0)
+    full, thin = (record(settings, PDController, [0], every=every) for every in (1, 10))
+    np.testing.assert_array_equal(full.electrical_energy[::10], thin.electrical_energy)
+    np.testing.assert_array_equal(full.time[::10], thin.time)
+    np.testing.assert_array_equal(metrics(full)["peak_voltage"], metrics(thin)["peak_voltage"])
+    with pytest.raises(ValueError, match=r"every must divide the number of control periods \(200\), got 7"):
+        record(settings, PDController, [0], every=7)

@@ -1,0 +1,117 @@
+"""Policies: files that never unpickle, an actor equal to SB3's, and refusals that say why."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO
+
+import agents.policy as policies
+from agents.policy import Policy, load_policy, policy_of, shipped_policies
+from elbow_gym.env import ElbowArmEnv
+from elbow_gym.sb3 import SB3VecEnv
+from elbow_gym.settings import Settings
+from elbow_gym.vector_env import ElbowArmVectorEnv
+
+
+@pytest.fixture(scope="module")
+def model():
+    arms = SB3VecEnv(ElbowArmVectorEnv(2, autoreset_mode="SameStep"))
+    kwargs = {"net_arch": [8, 8], "activation_fn": torch.nn.Tanh, "log_std_init": -1.5}
+    return PPO("MlpPolicy", arms, n_steps=4, batch_size=8, policy_kwargs=kwargs, seed=0, device="cpu")
+
+
+@pytest.fixture
+def policy(model):
+    return policy_of(model, Settings(), command="test")
+
+
+def test_policy_acts_as_the_model_that_it_came_from(model, policy):
+    observation = np.random.default_rng(0).normal(size=(7, policy.card.layers[0])).astype(np.float32)
+    expected, _ = model.predict(observation, deterministic=True)
+    np.testing.assert_allclose(policy.predict(observation)[0], expected, atol=1e-6)
+    np.testing.assert_allclose(policy.predict(observation[0])[0], expected[0], atol=1e-6)
+
+
+def test_saved_policy_comes_back_bit_for_bit(policy, tmp_path):
+    policy.save(tmp_path / "p")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["p.json", "p.safetensors"]
+    back = load_policy(tmp_path / "p")
+    assert back.card == policy.card
+    for name, weights in policy.weights.items():
+        np.testing.assert_array_equal(back.weights[name], weights)
+
+
+def test_interrupted_save_leaves_the_old_policy(policy, tmp_path, monkeypatch):
+    policy.save(tmp_path / "p")
+    before = (tmp_path / "p.safetensors").read_bytes()
+    monkeypatch.setattr("safetensors.numpy.save_file", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
+    with pytest.raises(OSError, match="disk full"):
+        policy.save(tmp_path / "p")
+    assert (tmp_path / "p.safetensors").read_bytes() == before
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("env", "message"),
+    [
+        ({"elbows": 1}, r"elbow_joints of the environment must be \(4, 7\) as in training, got \(4,\)"),
+        ({"voltage_limit": 12.0}, r"voltage_limit of the environment must be 24.0 as in training, got 12.0"),
+        ({"control_frequency": 100.0}, r"control_frequency of the environment must be 50.0 .* got 100.0"),
+        ({"action_unit": "volt"}, r"action_unit of the environment must be 'fraction' .* got 'volt'"),
+    ],
+)
+def test_policy_refuses_another_environment(policy, env, message):
+    policy.check(ElbowArmEnv())
+    with pytest.raises(ValueError, match=message):
+        policy.check(ElbowArmEnv(**env))
+
+
+def test_policy_refuses_another_observation(policy):
+    for card, message in (
+        (replace(policy.card, observation_version=0), "observation_version of the policy must be"),
+        (replace(policy.card, observation=policy.card.observation[::-1]), "observation of the policy must be"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            Policy(card, policy.weights).check(ElbowArmEnv())
+    with pytest.raises(ValueError, match=r"observation must have \d+ entries, got 3"):
+        policy.predict(np.zeros(3, np.float32))
+
+
+def test_bundle_that_does_not_fit_is_refused(policy, tmp_path):
+    with pytest.raises(ValueError, match=r"weight_0 must have shape \(8, \d+\), got nothing"):
+        Policy(policy.card, {})
+    with pytest.raises(ValueError, match="activation must be one of"):
+        Policy(replace(policy.card, activation="sine"), policy.weights)
+    with pytest.raises(ValueError, match="format of the policy must be 1, got 7"):
+        Policy(replace(policy.card, format=7), policy.weights)
+    with pytest.raises(ValueError, match=r"policy must be one of .*got no"):
+        load_policy(tmp_path / "nothing")
+    policy.save(tmp_path / "p")
+    (tmp_path / "p.json").write_text(json.dumps({"algorithm": "ppo"}))
+    with pytest.raises(ValueError, match="policy card must hold the fields of PolicyCard"):
+        load_policy(tmp_path / "p")
+
+
+def test_every_shipped_policy_loads_fits_and_is_small():
+    assert "ppo_elbows2" in shipped_policies()
+    for name in shipped_policies():
+        algorithm, elbows = name.split("_elbows")
+        policy = load_policy(algorithm, elbows=int(elbows))
+        policy.check(ElbowArmEnv(**policy.card.environment))
+        assert (policies.SHIPPED / f"{name}.safetensors").stat().st_size < 300_000
+        assert policy.card.command.startswith("python -m agents train")
+
+
+def test_shipped_two_elbow_policy_holds_its_promise():
+    from agents.keeper import evaluation
+
+    policy = load_policy("ppo", elbows=2)
+    figures = evaluation(policy, policy.settings)
+    assert figures["electrical_energy"] <= 250.0
+    assert figures["steady_error_rms_mm"] <= 5.0
+    for name, value in figures.items():
+        np.testing.assert_allclose(policy.card.evaluation[name], value, rtol=1e-3)
+    assert policy.card.training["seconds"] <= 600
