@@ -31,7 +31,7 @@ def observation_space(episodes: Episodes) -> spaces.Space[NDArray[np.float32]]:
 def as_action(action: object, shape: tuple[int, ...]) -> Array:
     """The action as float64. ValueError unless it is numbers of this shape."""
     try:
-        array = np.asarray(action, dtype=np.float64)
+        array = np.asarray(action, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
         raise ValueError(f"action must be numbers of shape {shape}, got {action!r}") from error
     if array.shape != shape:

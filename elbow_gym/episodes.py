@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym import task
+from elbow_gym import kernel, task
 from elbow_gym.circle import as_phase
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.parameters import Array
@@ -59,6 +58,8 @@ class Episodes:
         if settings.start == "on_target":
             self._on_target(np.linspace(0.0, 2.0 * np.pi, 73))
         self._path = np.repeat(self.circle.path[None], num_envs, axis=0)
+        self._n_substeps, self._horizon = settings.n_substeps, settings.horizon
+        self._turn = self.circle.rate * settings.control_period
         self._lookahead = self.circle.rate * task.LOOKAHEAD
         self._volts = 1.0 if settings.action_unit == "volt" else float(settings.voltage_limit)
         self._highest = float(settings.voltage_limit) / self._volts
@@ -142,25 +143,27 @@ class Episodes:
         return {str(key): state[key] for key in state}  # pyright: ignore
 
     def step(self, action: Array) -> Outcome:
-        """One control period under `action` (B, n), in the action's unit, held and clipped to the supply voltage.
+        """One control period under `action`, held and clipped to the supply voltage.
+
+        The action is in its unit, contiguous float64 (B, n).
 
         Raises ValueError, with the state untouched, when an action is not a number.
         """
         settings, simulator = self.settings, self.simulator
-        voltage = np.minimum(np.maximum(action, -self._highest), self._highest) * self._volts
-        voltage = np.ascontiguousarray(voltage)
-        if math.isnan(voltage.sum()):
+        voltage = np.empty_like(action)
+        if not kernel.drive(action, self._highest, self._volts, voltage):
             raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
-        simulator.advance(voltage, settings.n_substeps)
+        invalid = simulator.advance(voltage, self._n_substeps)
         self._steps += 1
         sight = self.look()
         total = sight.electrical_energy if settings.regeneration else sight.drawn_energy
         power = (total - self._spent) * settings.control_frequency
-        self._spent = total
+        self._spent = total.copy()
         tracking, energy = task.reward_terms(sight.tracking_error, power, self.tracking_weight, self.energy_weight)
-        terminated = ~simulator.valid
-        truncated = self._steps >= settings.horizon
-        if terminated.any():
+        terminated = np.zeros(self.num_envs, dtype=np.bool_)
+        truncated = self._steps >= self._horizon
+        if invalid:
+            terminated = ~simulator.valid
             tracking, energy = self._charge_the_rest(terminated, tracking, energy)
             truncated &= ~terminated
         info = self.info(sight, voltage, power, tracking, energy)
@@ -179,8 +182,7 @@ class Episodes:
 
     def angle(self) -> Array:
         """The target's angle on the circle now [rad], (B,)."""
-        turn = self.circle.rate * self.settings.control_period
-        return self._phase + np.asarray(turn * self._steps, dtype=np.float64)
+        return self._phase + np.multiply(self._turn, self._steps, dtype=np.float64)
 
     def look(self) -> task.Sight:
         """What is seen of every arm now."""
@@ -195,18 +197,17 @@ class Episodes:
         reward_energy: Array | None = None,
     ) -> dict[str, Array]:
         """Fresh arrays of the step's figures, one row per arm; after a reset, where none are given, flows are zero."""
-        simulator = self.simulator
         return {
-            "tracking_error": sight.tracking_error.copy(),
+            "tracking_error": sight.tracking_error,
             "electrical_power": np.zeros(self.num_envs) if power is None else power,
-            "electrical_energy": sight.electrical_energy.copy(),
-            "drawn_energy": sight.drawn_energy.copy(),
-            "link_work": sight.link_work.copy(),
+            "electrical_energy": sight.electrical_energy,
+            "drawn_energy": sight.drawn_energy,
+            "link_work": sight.link_work,
             "reward_tracking": np.zeros(self.num_envs) if reward_tracking is None else reward_tracking,
             "reward_energy": np.zeros(self.num_envs) if reward_energy is None else reward_energy,
             "voltage": np.zeros((self.num_envs, self.arm.n_joints)) if voltage is None else voltage,
-            "elbow_force": simulator.elbow_force.copy(),
-            "below_table": simulator.below_table.copy(),
+            "elbow_force": self.simulator.elbow_force.copy(),
+            "below_table": sight.below_table,
         }
 
     def get_state(self) -> dict[str, Any]:

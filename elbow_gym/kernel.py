@@ -18,7 +18,7 @@ This is the only file with compiled code: Numba's cache does not notice edits in
 from collections.abc import Callable
 from functools import cache
 from types import FunctionType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -45,6 +45,8 @@ PARAMETER_ROWS = len(PARAMETERS)
 # Columns of the per-arm summary (B, SUMMARY_COLUMNS + p): hand position, lowest joint or hand height, seconds spent
 # below the table (accumulated), 1 while the state is representable, then one force per elbow.
 HAND, LOWEST, BELOW_TABLE, VALID, SUMMARY_COLUMNS = 0, 3, 4, 5, 6
+# Rows that `observe` fills beside the observation.
+FIGURES = ("tracking_error", "electrical_energy", "drawn_energy", "link_work", "below_table")
 # Beyond this angle [rad] the sine loses digits; an arm gets there only by blowing up.
 LARGEST_ANGLE = 1e5
 # Elbows rest at z = 0 to 1e-8 m; lower than this is under the table.
@@ -132,6 +134,17 @@ def _path_point(coefficients, c, s, out):
         ch, sh = ch * c - sh * s, sh * c + ch * s
 
 
+def _drive(action, highest, volts, voltage):
+    """Fills voltage (B, n) with the clipped action (B, n) in volts. False when an action is not a number."""
+    numbers = True
+    for b in range(action.shape[0]):
+        for a in range(action.shape[1]):
+            value = action[b, a]
+            numbers = numbers and not np.isnan(value)
+            voltage[b, a] = min(max(value, -highest), highest) * volts
+    return numbers
+
+
 def _path(coefficients, angle, out):
     """Points out (m, 3) of a closed path at angles (m,): a Fourier series, rows 1, cos, sin, cos 2, sin 2..."""
     for i in range(angle.size):
@@ -140,7 +153,7 @@ def _path(coefficients, angle, out):
 
 
 def _observe(state, summary, pose, coefficients, angle, lookahead, scale, high, observation, figures):
-    """Fills observation (B, size) float32 and figures (B, 4): tracking error, electrical, drawn energy, link work.
+    """Fills observation (B, size) float32 and the rows FIGURES of figures, (5, B).
 
     coefficients (B, rows, 3) and angle (B,) are each arm's path and where the target stands on it; lookahead is an
     angle. In compiled code so that an arm's bits do not depend on how many others there are.
@@ -172,15 +185,17 @@ def _observe(state, summary, pose, coefficients, angle, lookahead, scale, high, 
             else:
                 value = c if m == 3 * n + 9 else s
             observation[b, m] = min(max(np.float32(value / scale[m]), -high[m]), high[m])
-        figures[b, 0] = np.sqrt(squared)
+        figures[0, b] = np.sqrt(squared)
+        figures[4, b] = summary[b, BELOW_TABLE]
         for column, row in ((1, 3), (2, 4), (3, 7)):
             total = 0.0
             for a in range(n):
                 total += state[b, row, a]
-            figures[b, column] = total
+            figures[column, b] = total
 
 
-Compiled = Callable[..., None]
+Compiled = Callable[..., Any]
+drive: Compiled = njit(cache=True, nogil=True, error_model="numpy")(_drive)
 path: Compiled = njit(cache=True, nogil=True, error_model="numpy")(_path)
 observe: Compiled = njit(cache=True, nogil=True, error_model="numpy")(_observe)
 
@@ -554,7 +569,7 @@ def unload(ws, tail, n, lane, elbows, out, summary):
         valid = valid and abs(ws[o + Q]) + 0.0 * (ws[o + QD] + ws[o + I] + meters) < LARGEST_ANGLE
     summary[VALID] = 1.0 if valid else 0.0
     if not valid:
-        return
+        return False
     for a in range(n):
         o = U(a * STRIDE + lane)
         for row in range(3):
@@ -570,6 +585,7 @@ def unload(ws, tail, n, lane, elbows, out, summary):
     summary[BELOW_TABLE] += tail[BELOW + k]
     for j in range(elbows.size):
         summary[SUMMARY_COLUMNS + j] = tail[FORCES + U(j * W) + k]
+    return True
 
 
 def advance(state, parameters, voltage, elbows, first, end, n_steps, step, summary):
@@ -577,8 +593,9 @@ def advance(state, parameters, voltage, elbows, first, end, n_steps, step, summa
 
     state (B, STATE_ROWS, n), parameters (B, PARAMETER_ROWS, n), voltage (B, n), summary (B, SUMMARY_COLUMNS + p).
     With n_steps = 0 only the summary is refreshed. An arm whose state leaves the representable keeps its old
-    state and summary, with VALID at zero.
+    state and summary, with VALID at zero. Returns the number of such arms.
     """
+    invalid = 0
     n = state.shape[2]
     ws = np.zeros((n + 1) * STRIDE)
     tail = np.zeros(TAIL)
@@ -602,7 +619,9 @@ def advance(state, parameters, voltage, elbows, first, end, n_steps, step, summa
             # Its summary is the end of this step, its accelerations the first stage of the next.
             evaluate(ws, tail, n, elbows)
         for lane in range(min(W, end - start)):
-            unload(ws, tail, n, lane, elbows, state[start + lane], summary[start + lane])
+            if not unload(ws, tail, n, lane, elbows, state[start + lane], summary[start + lane]):
+                invalid += 1
+    return invalid
 
 
 def accelerations(state, parameters, voltage, elbows, q_ddot, current_dot, elbow_force):

@@ -87,7 +87,7 @@ class Simulator:
         blocks = -(-self.num_envs // lanes)
         edges = np.linspace(0, blocks, min(self._num_threads, blocks) + 1).round().astype(int) * lanes
         self._shares = [(int(a), min(int(b), self.num_envs)) for a, b in itertools.pairwise(edges)]
-        self._pool = ThreadPoolExecutor(len(self._shares)) if len(self._shares) > 1 else None
+        self._pool = ThreadPoolExecutor(len(self._shares) - 1) if len(self._shares) > 1 else None
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the compiled functions and the threads, for pickling and copying."""
@@ -181,27 +181,27 @@ class Simulator:
             raise ValueError(f"n_substeps must be a positive integer, got {n_substeps!r}")
         self.advance(np.ascontiguousarray(voltage), int(n_substeps))
 
-    def advance(self, voltage: Array, n_substeps: int) -> None:
-        """`step` without its checks, for callers that made them: a contiguous float64 (B, n) of finite volts."""
-        self._run(voltage, n_substeps)
+    def advance(self, voltage: Array, n_substeps: int) -> int:
+        """`step` without its checks, for callers that made them: a contiguous float64 (B, n) of finite volts.
+
+        Returns the number of arms that are not `valid`.
+        """
         self._steps += n_substeps
+        return self._run(voltage, n_substeps)
 
     @property
     def raw(self) -> tuple[Array, Array]:
         """The kernel's own state and summary arrays, for functions that only read them."""
         return self._state, self._summary
 
-    def _run(self, voltage: Array, n_substeps: int) -> None:
-        fixed = (self._state, self._parameters, voltage, self._elbow_index)
-        moving = (n_substeps, self.timestep, self._summary)
-        if self._pool is None:
-            self._advance(*fixed, *self._shares[0], *moving)
-        else:
+    def _run(self, voltage: Array, n_substeps: int) -> int:
+        def run(share: tuple[int, int]) -> int:
+            fixed = (self._state, self._parameters, voltage, self._elbow_index)
+            return self._advance(*fixed, *share, n_substeps, self.timestep, self._summary)
 
-            def run(share: tuple[int, int]) -> None:
-                self._advance(*fixed, *share, *moving)
-
-            list(self._pool.map(run, self._shares))
+        # This thread takes the first share itself: one hand-over less.
+        others = [self._pool.submit(run, share) for share in self._shares[1:]] if self._pool is not None else []
+        return run(self._shares[0]) + sum(other.result() for other in others)
 
     def get_state(self) -> dict[str, NDArray[Any]]:
         """A copy of everything that runs on; `set_state` continues from it bit for bit."""

@@ -105,6 +105,8 @@ class Sight(NamedTuple):
     """The same of the positive power alone [J], (B,)."""
     link_work: Array
     """Sum over the joints since the reset [J], (B,)."""
+    below_table: Array
+    """Time under the table since the reset [s], (B,)."""
 
 
 def look(
@@ -121,9 +123,9 @@ def look(
         lookahead: angle between the target and the look-ahead target [rad].
     """
     arms = simulator.num_envs
-    seen, figures = np.empty((arms, layout.size), np.float32), np.empty((arms, 4))
+    seen, figures = np.empty((arms, layout.size), np.float32), np.empty((len(kernel.FIGURES), arms))
     kernel.observe(*simulator.raw, pose, path, angle, lookahead, layout.scale, layout.high, seen, figures)
-    return Sight(seen, figures[:, 0], figures[:, 1], figures[:, 2], figures[:, 3])
+    return Sight(seen, *figures)
 
 
 def reward_terms(error: Array, power: Array, tracking_weight: float, energy_weight: float) -> tuple[Array, Array]:

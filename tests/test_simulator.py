@@ -124,8 +124,9 @@ def test_a_hanging_arm_is_below_the_table_all_the_time_and_an_upright_one_never(
 
 
 def stalled(current=None):
-    """An arm whose rotors are too heavy to move: L di/dt = v - R i alone."""
-    sim = Simulator(replace(paper_arm(), motors=(MotorParameters(rotor_inertia=1e12),) * 10), 0, timestep=1e-4)
+    """An arm whose rotors are too heavy to move and hardly driven: L di/dt = v - R i alone."""
+    motor = MotorParameters(rotor_inertia=1e12, torque_constant=1e-200)
+    sim = Simulator(replace(paper_arm(), motors=(motor,) * 10), 0, timestep=1e-4)
     sim.reset(current=current)
     return sim
 
