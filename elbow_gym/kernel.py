@@ -52,7 +52,7 @@ LARGEST_ANGLE = 1e5
 # Elbows rest at z = 0 to 1e-8 m; lower than this is under the table.
 BELOW_TABLE_TOLERANCE = 1e-6
 MAXIMUM_ELBOWS = 8
-# A projection onto the table is repeated while it turns a link by more than this [rad], so many times at most.
+# A projection onto the table is repeated while it turns a link by more than this [rad per m of it], so often at most.
 SMALL_SHIFT = 1e-7
 NEWTON_STEPS = 30
 # Slots of a record, named where the kernel is made; one per possible elbow follows them.
@@ -84,7 +84,8 @@ IR3, IZ3, R = FR, FZ, T
 AR, AZ, ALPHA = CR, CZ, C3 = KRR, KRZ, KZZ
 HEIGHT, RATE, GRAM = K33, BR, BZ
 Y = W * SLOTS
-STRIDE = W * (SLOTS + MAXIMUM_ELBOWS)
+# One row more, so that a slot of neighbouring records does not fall on the same cache lines.
+STRIDE = W * (SLOTS + MAXIMUM_ELBOWS + 1)
 NEXT = U(STRIDE)
 # Rows of a block: the Delassus matrix and the elbow forces, time below the table, the projection's shift and mask.
 FORCES = U(W * MAXIMUM_ELBOWS * MAXIMUM_ELBOWS)
@@ -206,30 +207,31 @@ def project(ws, tail, elbows):
     Mostly one: the drift is the integrator's local error, whose square is below rounding. Near a segment that stands
     upright it takes more. A lane stops by its own shift, so its bits do not depend on its neighbours'.
     """
-    for k in range(LANES):
-        tail[SHIFT + k] = np.inf
+    lanes = min(LANES, U(ws.size))
+    for k in range(lanes):
+        tail[ACTIVE + k] = 1.0
     for _ in range(NEWTON_STEPS):
-        moving = False
-        for k in range(LANES):
-            moving = moving or tail[SHIFT + k] > SMALL_SHIFT
-        if not moving:
-            break
         newton(ws, tail, elbows)
+        moving = 0.0
+        for k in range(lanes):
+            moving = max(moving, tail[ACTIVE + k])
+        if moving == 0.0:
+            break
 
 
 def newton(ws, tail, elbows):
-    """One step of `project` in the lanes whose last shift was not small.
+    """One step of `project` in the active lanes; those stay active that it has moved far.
 
     All elbows lie at z = 0, so the links between two neighbours close on their own and no matrix is solved.
     """
-    for k in range(LANES):
-        tail[ACTIVE + k] = 1.0 if tail[SHIFT + k] > SMALL_SHIFT else 0.0
-        tail[SHIFT + k] = 0.0
+    lanes = min(LANES, U(ws.size))
     first = 1
+    for k in range(lanes):
+        tail[SHIFT + k] = 0.0
     for j in range(elbows.size):
         last = elbows[j] - 2
         o = U((first - 1) * STRIDE)
-        for k in range(LANES):
+        for k in range(lanes):
             ws[o + HEIGHT + k] = 0.0
             ws[o + RATE + k] = 0.0
             # A floor far below any real lever arm keeps a segment that stands upright finite.
@@ -249,10 +251,12 @@ def newton(ws, tail, elbows):
                 ws[o + GRAM + k] = ws[o - NEXT + GRAM + k] + ls * ls
                 ws[o + ER + k] = ls
         o = U(last * STRIDE)
-        for k in range(LANES):
+        for k in range(lanes):
             scale = tail[ACTIVE + k] / ws[o + GRAM + k]
-            ws[o + HEIGHT + k] *= scale
+            height = ws[o + HEIGHT + k] * scale
+            ws[o + HEIGHT + k] = height
             ws[o + RATE + k] *= scale
+            tail[SHIFT + k] = max(tail[SHIFT + k], abs(height))
         # Tip to base: a link's own absolute shift, which the link after it takes back from its relative angle.
         for a in range(last, first - 1, -1):
             o = U(a * STRIDE)
@@ -267,8 +271,9 @@ def newton(ws, tail, elbows):
                 ws[o + QD + k] += kick
                 ws[o + NEXT + Q + k] -= shift
                 ws[o + NEXT + QD + k] -= kick
-                tail[SHIFT + k] = max(tail[SHIFT + k], abs(shift))
         first = last + 1
+    for k in range(lanes):
+        tail[ACTIVE + k] = 1.0 if tail[SHIFT + k] > SMALL_SHIFT else 0.0
 
 
 def outward(ws, n):

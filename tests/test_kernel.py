@@ -114,7 +114,8 @@ def test_an_arm_that_blows_up_keeps_its_state_and_spares_its_neighbours(lanes, v
     voltage[3] = volts
     before, summary = state.copy(), np.full((7, kernel.SUMMARY_COLUMNS + 2), 7.0)
     summary[:, kernel.BELOW_TABLE] = 0.0
-    kernel.kernel(lanes).advance(state, parameters, voltage, np.array(ELBOWS), 0, 7, 20, 0.001, summary)
+    invalid = kernel.kernel(lanes).advance(state, parameters, voltage, np.array(ELBOWS), 0, 7, 20, 0.001, summary)
+    assert invalid == 1
     np.testing.assert_array_equal(state[3], before[3])
     np.testing.assert_array_equal(summary[3], [7.0, 7.0, 7.0, 7.0, 0.0, 0.0, 7.0, 7.0])
     found, expected = np.concatenate([state.reshape(7, -1), summary], axis=1), advanced(lanes, 7)
