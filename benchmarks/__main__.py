@@ -1,4 +1,4 @@
-"""The command line: `python -m benchmarks energy`."""
+"""The command line: `python -m benchmarks energy` and `python -m benchmarks speed`."""
 
 from __future__ import annotations
 
@@ -26,13 +26,16 @@ def energy(output: Path = RESULTS, episodes: int = 20) -> None:
 
 
 @app.command
-def list_results(output: Path = RESULTS) -> None:
-    """Names the result files that are there.
+def speed(output: Path = RESULTS, quick: bool = False) -> None:
+    """This project against MuJoCo, Pinocchio, NumPy and Gymnasium: table, CSV, JSON and a figure.
 
     Args:
-        output: folder of the results.
+        output: folder for the results.
+        quick: few and short samples, to see that all works.
     """
-    print("\n".join(str(path) for path in sorted(output.iterdir())))
+    from benchmarks.speed import speed as run
+
+    run(output, quick)
 
 
 def main() -> None:

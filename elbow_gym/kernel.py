@@ -15,8 +15,10 @@ This is the only file with compiled code: Numba's cache does not notice edits in
 # pyright: basic
 # ruff: noqa: E741, ANN001, ANN201, ANN202
 
+import sys
 from collections.abc import Callable
 from functools import cache
+from threading import Timer
 from types import FunctionType
 from typing import Any, NamedTuple
 
@@ -70,6 +72,7 @@ _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.1359
 
 U = np.uint64
 BLOCK_LANES = 16
+PATIENCE = 2.0  # a compilation that takes longer [s] is announced
 W = BLOCK_LANES  # the length of a row in the workspace
 LANES = U(W)
 (
@@ -121,10 +124,18 @@ def sincos(x):
     return s, c
 
 
-_sincos = njit(nogil=True, error_model="numpy")(sincos)
+def _compiled(function, cached=False, inlined=False):
+    """The compiled function, without a cache on disk where no folder can be written."""
+    try:
+        return njit(nogil=True, error_model="numpy", cache=cached, forceinline=inlined)(function)
+    except RuntimeError:
+        return njit(nogil=True, error_model="numpy", forceinline=inlined)(function)
 
 
-@njit(nogil=True, error_model="numpy")
+_sincos = _compiled(sincos)
+
+
+@_compiled
 def _path_point(coefficients, c, s, out):
     ch, sh = c, s
     for axis in range(3):
@@ -196,9 +207,9 @@ def _observe(state, summary, pose, coefficients, angle, lookahead, scale, high, 
 
 
 Compiled = Callable[..., Any]
-drive: Compiled = njit(cache=True, nogil=True, error_model="numpy")(_drive)
-path: Compiled = njit(cache=True, nogil=True, error_model="numpy")(_path)
-observe: Compiled = njit(cache=True, nogil=True, error_model="numpy")(_observe)
+drive: Compiled = _compiled(_drive, cached=True)
+path: Compiled = _compiled(_path, cached=True)
+observe: Compiled = _compiled(_observe, cached=True)
 
 
 def project(ws, tail, elbows):
@@ -674,7 +685,7 @@ class Kernel(NamedTuple):
 
 @cache
 def kernel(lanes: int) -> Kernel:
-    """The entries for blocks of `lanes` arms (a divisor of W), compiled at their first call.
+    """The entries for blocks of `lanes` arms (a divisor of W), compiled or taken from the cache.
 
     The functions above are templates: each lane count gets its own copy, whose globals are its own row offsets and its
     own compiled callees. Closures would do the same, but Numba's disk cache never recognises a closure over compiled
@@ -690,7 +701,23 @@ def kernel(lanes: int) -> Kernel:
         name = template.__name__
         copy = FunctionType(template.__code__, space, f"{name}_{lanes}")
         copy.__qualname__ = copy.__name__
-        space[name] = njit(nogil=True, error_model="numpy", cache=name in Kernel._fields, forceinline=name in INLINED)(
-            copy
-        )
-    return Kernel(*(space[name] for name in Kernel._fields))
+        space[name] = _compiled(copy, cached=name in Kernel._fields, inlined=name in INLINED)
+    made = Kernel(*(space[name] for name in Kernel._fields))
+    _compile_now(made)
+    return made
+
+
+def _compile_now(made):
+    """Calls the entries that every run needs once, on an arm of nothing; says so when that takes a while."""
+    elbows, one = np.array([3]), np.ones((1, 3))
+    parameters = np.ones((1, PARAMETER_ROWS, 3))
+    state, summary = np.ones((1, STATE_ROWS, 3)), np.zeros((1, SUMMARY_COLUMNS + 1))
+    message = "elbow_gym: compiling its kernel for this machine, once; later starts take it from the cache"
+    notice = Timer(PATIENCE, print, (message,), {"file": sys.stderr, "flush": True})
+    notice.daemon = True
+    notice.start()
+    try:
+        made.advance(state, parameters, one, elbows, 0, 1, 0, 0.001, summary)
+        made.settle(one, parameters, elbows)
+    finally:
+        notice.cancel()

@@ -63,6 +63,11 @@ def test_sine_and_cosine_hold_in_every_quadrant_and_at_its_edges():
         assert kernel.sincos(angle) == pytest.approx((math.sin(angle), math.cos(angle)), rel=0.0, abs=2.3e-16)
 
 
+def test_sine_keeps_its_digits_near_its_zeros():
+    for angle in np.arange(1.0, 30000.0, 7.0) * np.pi:
+        assert kernel.sincos(angle)[0] == pytest.approx(math.sin(angle), rel=1e-12, abs=0.0)
+
+
 @pytest.mark.parametrize("lanes", [1, kernel.BLOCK_LANES])
 @pytest.mark.parametrize("elbows", [0, 1, 2])
 def test_accelerations_and_elbow_forces_are_pinocchios(arm, lanes, elbows):
