@@ -14,24 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from elbow_gym import kernel
 from elbow_gym.kinematics import constraint_jacobian, elbow_heights
 from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows, positive
-from elbow_gym.tables import parameter_table
+from elbow_gym.tables import as_batch, parameter_table
 
 # Explicit RK4 is stable up to 2.785 / rate; the fastest rate of this family is the armature's R / L.
 STABILITY_LIMIT = 2.7
-# A given state may be off the elbows' plane by this much [m, m/s].
+# A given pose may be off the elbows' plane by this much [m], its rates by this much [m/s].
 PLANE_TOLERANCE = 1e-8
-
-
-def _batch(name: str, value: ArrayLike, shape: tuple[int, int]) -> Array:
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must be numbers of shape {shape} or {shape[1:]}, got {value!r}") from error
-    if array.shape not in (shape, shape[1:]):
-        raise ValueError(f"{name} must have shape {shape} or {shape[1:]}, got {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
-    return np.broadcast_to(array, shape)
+RATE_TOLERANCE = 1e-6
 
 
 class Simulator:
@@ -79,6 +68,10 @@ class Simulator:
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
         self._num_threads = int(num_threads)
         self._attach()
+        self._nominal = as_batch("nominal_pose", self.arm.nominal_pose, (self.num_envs, n))
+        if self.elbows and np.abs(elbow_heights(self.arm, self.arm.nominal_pose, self.elbows)).max() > PLANE_TOLERANCE:
+            self._nominal = self.on_table(self.arm.nominal_pose)
+        self.reset()
 
     def _attach(self) -> None:
         # Up to two arms the lanes of a block would mostly idle.
@@ -108,8 +101,8 @@ class Simulator:
 
         Args:
             q: relative angles [rad], (B, n) or (n,), elbows at z = 0 to 1e-8 m (`on_table` helps);
-                the arm's nominal pose when None.
-            q_dot: rates [rad/s] that keep the elbows on the table to 1e-8 m/s; zero when None.
+                the arm's nominal pose, moved onto the plane if it is not there, when None.
+            q_dot: rates [rad/s] that keep the elbows on the table to 1e-6 m/s; zero when None.
             current: armature currents [A]; zero when None.
             mask: which arms, shape (B,); all when None.
         """
@@ -118,16 +111,19 @@ class Simulator:
         self._state[chosen, 0] = q[chosen]
         self._state[chosen, 1] = q_dot[chosen]
         self._state[chosen, 2] = current[chosen]
+        valid = self._summary[:, kernel.VALID].copy()
         self._summary[chosen] = 0.0
         self._steps[chosen] = 0
-        self._run(np.zeros_like(q), 0)
+        self._run(np.zeros(q.shape), 0)
+        # Looking at the other arms' last state again does not make it the outcome of their last step.
+        self._summary[~chosen, kernel.VALID] = valid[~chosen]
 
     def on_table(self, q: ArrayLike) -> Array:
         """The nearest poses (least change of absolute pitch) with every elbow at z = 0 [rad], (B, n).
 
         Raises ValueError when there is no such pose near one of `q`, (B, n) or (n,).
         """
-        settled = _batch("q", q, (self.num_envs, self.arm.n_joints)).copy()
+        settled = as_batch("q", q, (self.num_envs, self.arm.n_joints)).copy()
         if self.elbows:
             self._settle(settled, self._parameters, self._elbow_index)
             if not (np.abs(settled).max() < kernel.LARGEST_ANGLE):
@@ -145,9 +141,9 @@ class Simulator:
         """The arguments of `reset` as full arrays. Raises its ValueErrors and changes nothing."""
         n = self.arm.n_joints
         shape = (self.num_envs, n)
-        q = _batch("q", self.arm.nominal_pose if q is None else q, shape)
-        q_dot = _batch("q_dot", np.zeros(n) if q_dot is None else q_dot, shape)
-        current = _batch("current", np.zeros(n) if current is None else current, shape)
+        q = self._nominal if q is None else as_batch("q", q, shape)
+        q_dot = as_batch("q_dot", np.zeros(n) if q_dot is None else q_dot, shape)
+        current = as_batch("current", np.zeros(n) if current is None else current, shape)
         chosen = np.ones(self.num_envs, dtype=np.bool_) if mask is None else np.asarray(mask, dtype=np.bool_)
         if chosen.shape != (self.num_envs,):
             raise ValueError(f"mask must have shape {(self.num_envs,)}, got {chosen.shape}")
@@ -167,7 +163,7 @@ class Simulator:
         for pose, rate in zip(q, q_dot, strict=True):
             if rate.any():
                 speed = np.abs(constraint_jacobian(self.arm, pose, self.elbows) @ rate).max()
-                if speed > PLANE_TOLERANCE:
+                if speed > RATE_TOLERANCE:
                     raise ValueError(f"q_dot must keep the elbows at z = 0, got {speed:.6g} m/s off the table")
 
     def step(self, voltage: ArrayLike, n_substeps: int = 1) -> None:
@@ -176,10 +172,10 @@ class Simulator:
         An arm whose state leaves what float64 can represent keeps its last state and shows in `valid`.
         Raises ValueError, with the state untouched, on a wrong shape, a non-finite voltage or n_substeps < 1.
         """
-        voltage = _batch("voltage", voltage, (self.num_envs, self.arm.n_joints))
+        voltage = as_batch("voltage", voltage, (self.num_envs, self.arm.n_joints))
         if isinstance(n_substeps, bool) or not isinstance(n_substeps, numbers.Integral) or n_substeps < 1:
             raise ValueError(f"n_substeps must be a positive integer, got {n_substeps!r}")
-        self.advance(np.ascontiguousarray(voltage), int(n_substeps))
+        self.advance(np.array(voltage, order="C"), int(n_substeps))
 
     def advance(self, voltage: Array, n_substeps: int) -> int:
         """`step` without its checks, for callers that made them: a contiguous float64 (B, n) of finite volts.

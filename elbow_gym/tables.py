@@ -1,8 +1,9 @@
-"""An arm as the kernel reads it: its parameters in rows."""
+"""Arms as the kernel reads them: parameters in rows, and quantities of a batch."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elbow_gym import kernel
 from elbow_gym.parameters import ArmParameters, Array
@@ -30,3 +31,16 @@ def parameter_table(arm: ArmParameters, payload: float = 0.0) -> Array:
         "payload": payload * one,
     }
     return np.stack([rows[name] for name in kernel.PARAMETERS])
+
+
+def as_batch(name: str, value: ArrayLike, shape: tuple[int, int]) -> Array:
+    """A quantity as (B, n) float64, from (B, n) or one row for all. ValueError naming `name` unless finite numbers."""
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be numbers of shape {shape} or {shape[1:]}, got {value!r}") from error
+    if array.shape not in (shape, shape[1:]):
+        raise ValueError(f"{name} must have shape {shape} or {shape[1:]}, got {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
+    return np.broadcast_to(array, shape)

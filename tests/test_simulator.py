@@ -125,8 +125,8 @@ def test_a_hanging_arm_is_below_the_table_all_the_time_and_an_upright_one_never(
 
 def stalled(current=None):
     """An arm whose rotors are too heavy to move and hardly driven: L di/dt = v - R i alone."""
-    motor = MotorParameters(rotor_inertia=1e12, torque_constant=1e-200)
-    sim = Simulator(replace(paper_arm(), motors=(motor,) * 10), 0, timestep=1e-4)
+    heavy = (MotorParameters(rotor_inertia=1e12, torque_constant=1e-200),) * 10
+    sim = Simulator(replace(paper_arm(), motors=heavy), 0, timestep=1e-4)
     sim.reset(current=current)
     return sim
 
@@ -166,8 +166,7 @@ def test_drawn_energy_leaves_out_what_flows_back():
     # v = -1 V against a current of 20 A that stays positive for 5 ms: all of it flows back.
     sim = stalled(np.full(10, 20.0))
     sim.step(np.full(10, -1.0), 20)
-    decay = 0.0017 / 1.1
-    flowed = -0.002 / 1.1 + (20.0 + 1.0 / 1.1) * decay * (1.0 - np.exp(-0.002 / decay))
+    flowed = -0.002 / 1.1 + (20.0 + 1.0 / 1.1) * 0.0017 / 1.1 * (1.0 - np.exp(-0.002 * 1.1 / 0.0017))
     np.testing.assert_allclose(sim.electrical_energy, -flowed, rtol=1e-7)
     assert not sim.drawn_energy.any()
 
@@ -249,3 +248,26 @@ def test_running_state_cannot_be_written_to():
         sim.q[0, 0] = 1.0
     with pytest.raises(ValueError, match="read-only"):
         sim.elbow_force[0, 0] = 1.0
+
+
+def test_a_new_simulator_rests_in_the_nominal_pose_on_the_table():
+    sim = Simulator("paper", (3, 5))
+    assert np.abs(kinematics.elbow_heights(sim.arm, sim.q, sim.elbows)).max() <= 1e-12
+    np.testing.assert_array_equal(Simulator("paper", 2).q[0], Simulator("paper", 2).arm.nominal_pose)
+
+
+def test_resetting_one_arm_leaves_anothers_failure_standing():
+    sim = Simulator("paper", 2, 3)
+    voltage = np.zeros((3, 10))
+    voltage[1] = 1e300
+    sim.step(voltage, 5)
+    sim.reset(mask=np.array([True, False, False]))
+    assert sim.valid.tolist() == [True, False, True]
+
+
+def test_a_running_state_can_be_given_back():
+    sim = Simulator("paper", 2)
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        sim.step(24.0 * rng.choice([-1.0, 1.0], 10), 10)
+    sim.reset(sim.q, sim.q_dot, sim.current)
