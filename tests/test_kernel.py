@@ -154,3 +154,12 @@ def test_settling_lays_elbows_on_the_plane_by_the_least_change_of_pitch(arm, lan
     gradients = np.array([slope * (np.arange(9) < links) for links in (2, 5)])
     assert np.abs(shift).max() > 1e-6
     np.testing.assert_allclose(shift - shift @ np.linalg.pinv(gradients) @ gradients, 0.0, atol=1e-9)
+
+
+def test_what_no_folder_can_cache_is_compiled_all_the_same():
+    # A function without a source file has no place in the cache, as all have none where no folder can be written.
+    space = {}
+    exec("def double(x):\n    return 2.0 * x", space)
+    with pytest.raises(RuntimeError, match="cannot cache"):
+        kernel.njit(cache=True)(space["double"])
+    assert kernel._compiled(space["double"], cached=True)(3.0) == 6.0
