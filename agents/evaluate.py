@@ -49,9 +49,7 @@ def in_all_regimes(
     return results
 
 
-def named_controller(
-    name: str, elbows: int | None, action_unit: str = "fraction"
-) -> tuple[Settings, Callable[[ElbowArmVectorEnv], Controller]]:
+def named_controller(name: str, elbows: int | None) -> tuple[Settings, Callable[[ElbowArmVectorEnv], Controller]]:
     """The environment and the maker of a controller by its name.
 
     Names: "pd" (the paper's, clipped to 24 V, read at 2 kHz), "pd_paper" (unlimited, 10 kHz), an algorithm whose policy
@@ -65,7 +63,7 @@ def named_controller(
         )
         return settings, PDController
     if name == "pd":
-        return Settings(elbows=count, control_frequency=2e3, timestep=5e-4, action_unit=action_unit), PDController
+        return Settings(elbows=count, control_frequency=2e3, timestep=5e-4), PDController
     is_path = pair(Path(name))[0].is_file()
     policy = load_policy(name) if is_path else load_policy(name, elbows=count)
     if elbows is not None and policy.settings.elbows != elbows:
