@@ -60,7 +60,18 @@ def measure(seeds: Sequence[int], progress: Callable[[str, int, int], None]) -> 
     return rows
 
 
-HEADER = ("controller", "elbows", "regime", "energy (J)", "drawn (J)", "rms (mm)", "z rms (mm)", "return", "pull (N)")
+HEADER = (
+    "controller",
+    "elbows",
+    "regime",
+    "energy (J)",
+    "drawn (J)",
+    "rms (mm)",
+    "z rms (mm)",
+    "return",
+    "pull (N)",
+    "below (s)",
+)
 
 
 def shown(row: Row, estimate: Callable[[Estimate], str]) -> tuple[str, ...]:
@@ -78,6 +89,7 @@ def shown(row: Row, estimate: Callable[[Estimate], str]) -> tuple[str, ...]:
         f"{figures['return'].value:.4g}",
         # Only a negative force is a pull on the table.
         f"{force:.1f}" if force < 0.0 else "-",
+        f"{figures['below_table'].value:.2f}",
     )
 
 
@@ -189,7 +201,7 @@ def energy(output: Path = RESULTS, episodes: int = len(BENCHMARK_SEEDS)) -> list
         rows = measure(seeds, progress)
     save(rows, seeds, time.monotonic() - started, output)
     # Wider than a pipe's 80 columns, which would cut the figures.
-    console = Console(width=max(Console().width, 100))
+    console = Console(width=max(Console().width, 110))
     console.print(table(rows))
     console.print("Regimes: " + "; ".join(f"{regime.name} = {regime.meaning}" for regime in REGIMES))
     console.print(f"Written: {output / 'energy.csv'}, energy.json, energy.md, energy.png")
