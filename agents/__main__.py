@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from agents.cli import run
 from agents.train import PPOSettings
 
 DEFAULT_PPO = PPOSettings()
@@ -25,9 +26,9 @@ def reproduce(output: Path = Path("reproduction"), publish: bool = False) -> Non
         output: folder for figures, CSV files and the verdict.
         publish: also refresh the README's picture and the committed numbers.
     """
-    from agents.reproduce import reproduce as run
+    from agents.reproduce import reproduce as reproduce_paper
 
-    run(output, publish=publish)
+    reproduce_paper(output, publish=publish)
 
 
 @app.command
@@ -90,13 +91,5 @@ def evaluate(policy: tyro.conf.Positional[str], /, elbows: int | None = None, ep
     print_results(f"{policy}, elbows {settings.elbow_joints}, {episodes} episodes: mean ± standard deviation", results)
 
 
-def main() -> None:
-    """Runs a command; a wrong argument ends with one line that says what is wrong."""
-    try:
-        app.cli(prog="python -m agents", description=__doc__)
-    except ValueError as error:
-        sys.exit(f"error: {error}")
-
-
 if __name__ == "__main__":
-    main()
+    run(app, "python -m agents", __doc__)

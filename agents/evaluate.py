@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from agents.controller import Controller
 from agents.metrics import REGIMES, UNITS, joint_energies, metrics
-from agents.pd import PDController
+from agents.pd import CLIPPED, UNLIMITED, PDController
 from agents.policy import Policy, load_policy, pair
 from agents.recording import record
 from elbow_gym.settings import Settings
@@ -57,13 +57,9 @@ def named_controller(name: str, elbows: int | None) -> tuple[Settings, Callable[
     """
     count = 2 if elbows is None else elbows
     if name == "pd_paper":
-        # The unclipped PD peaks at 377 V; the limit only has to stay out of its way.
-        settings = Settings(
-            elbows=count, control_frequency=1e4, timestep=1e-4, voltage_limit=1000.0, action_unit="volt"
-        )
-        return settings, PDController
+        return Settings(elbows=count, **UNLIMITED), PDController
     if name == "pd":
-        return Settings(elbows=count, control_frequency=2e3, timestep=5e-4), PDController
+        return Settings(elbows=count, **CLIPPED), PDController
     is_path = pair(Path(name))[0].is_file()
     policy = load_policy(name) if is_path else load_policy(name, elbows=count)
     if elbows is not None and policy.settings.elbows != elbows:

@@ -14,6 +14,14 @@ from elbow_gym.vector_env import ElbowArmVectorEnv
 
 PAPER_KP = 500.0
 PAPER_KD = 20.0
+# Arguments of the environments that it acts in. Unclipped it peaks at 377 V: the limit only has to stay out of its way.
+UNLIMITED: dict[str, Any] = {
+    "control_frequency": 10_000.0,
+    "timestep": 1e-4,
+    "voltage_limit": 1000.0,
+    "action_unit": "volt",
+}
+CLIPPED: dict[str, Any] = {"control_frequency": 2000.0, "timestep": 5e-4, "voltage_limit": 24.0, "action_unit": "volt"}
 
 
 class PDController:

@@ -15,7 +15,7 @@ import numpy as np
 from agents.figures import CASES, SETTLED, draw, thinned, write_series
 from agents.files import write_csv, write_text, write_whole
 from agents.metrics import joint_energies, metrics
-from agents.pd import PDController
+from agents.pd import CLIPPED, UNLIMITED, PDController
 from agents.recording import Recording, record
 from agents.style import ELBOW_NAMES
 from agents.verdict import Claim, Numbers, as_markdown, verdict
@@ -30,8 +30,6 @@ PICTURE_PERIOD = 0.002
 # A figure takes about as long to draw as this many control periods to run, so that one bar's time left holds for both.
 FIGURE_PERIODS = 1500
 
-UNLIMITED = {"control_frequency": 10_000.0, "timestep": 1e-4, "voltage_limit": 1000.0}
-CLIPPED = {"control_frequency": 2000.0, "timestep": 5e-4, "voltage_limit": 24.0}
 RUNS: dict[str, dict[str, Any]] = {
     "paper": {**UNLIMITED, "start": "paper"},
     "on target": {**UNLIMITED, "start": "on_target"},
@@ -118,7 +116,7 @@ def reproduce(output: Path = Path("reproduction"), publish: bool = False) -> Rep
 
 def settings_of(elbows: int, name: str, **changes: Any) -> Settings:
     """The environment of one of `RUNS`."""
-    return Settings(**{"elbows": elbows, "action_unit": "volt", "start_noise": 0.0, **RUNS[name], **changes})
+    return Settings(**{"elbows": elbows, "start_noise": 0.0, **RUNS[name], **changes})
 
 
 def play(settings: Settings, progress: Callable[[int], Any] | None = None) -> Played:

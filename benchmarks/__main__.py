@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import tyro
 
+from agents.cli import run
 from benchmarks.energy import RESULTS
 
 app = tyro.extras.SubcommandApp()
@@ -20,9 +20,9 @@ def energy(output: Path = RESULTS, episodes: int = 20) -> None:
         output: folder for the results.
         episodes: start poses, one fixed seed each.
     """
-    from benchmarks.energy import energy as run
+    from benchmarks.energy import energy as measure_energy
 
-    run(output, episodes)
+    measure_energy(output, episodes)
 
 
 @app.command
@@ -33,18 +33,10 @@ def speed(output: Path = RESULTS, quick: bool = False) -> None:
         output: folder for the results.
         quick: few and short samples, to see that all works.
     """
-    from benchmarks.speed import speed as run
+    from benchmarks.speed import speed as measure_speed
 
-    run(output, quick)
-
-
-def main() -> None:
-    """Runs a command; a wrong argument ends with one line that says what is wrong."""
-    try:
-        app.cli(prog="python -m benchmarks", description=__doc__)
-    except ValueError as error:
-        sys.exit(f"error: {error}")
+    measure_speed(output, quick)
 
 
 if __name__ == "__main__":
-    main()
+    run(app, "python -m benchmarks", __doc__)

@@ -57,7 +57,7 @@ MAXIMUM_ELBOWS = 8
 # A projection onto the table is repeated while it turns a link by more than this [rad per m of it], so often at most.
 SMALL_SHIFT = 1e-7
 NEWTON_STEPS = 30
-# Slots of a record, named where the kernel is made; one per possible elbow follows them.
+# Slots of a record, named below; one per possible elbow follows them.
 SLOTS = 56
 
 _ROUND = 6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds to the nearest integer
