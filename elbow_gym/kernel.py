@@ -58,7 +58,7 @@ MAXIMUM_ELBOWS = 8
 SMALL_SHIFT = 1e-7
 NEWTON_STEPS = 30
 # Slots of a record, named below; one per possible elbow follows them.
-SLOTS = 56
+SLOTS = 52
 
 _ROUND = 6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds to the nearest integer
 _TWO_OVER_PI = 0.6366197723675814
@@ -76,16 +76,16 @@ PATIENCE = 2.0  # a compilation that takes longer [s] is announced
 W = BLOCK_LANES  # the length of a row in the workspace
 LANES = U(W)
 (
-    Q, QD, I, Q0, QD0, I0, QA, QDA, IA, ELECTRICAL, DRAWN, COPPER, FRICTION, WORK, V,
+    Q, QD, I, Q0, QD0, I0, QDA, IA, ELECTRICAL, DRAWN, COPPER, FRICTION, WORK, V,
     LENGTH, MASS, END_INERTIA, DIFFERENCE, AXIAL, ROTOR, KM, DAMPING, MOTOR_DAMPING, RESISTANCE, INVERSE_L,
     GRAVITY, PAYLOAD,
     PHI, OMEGA, SPIN, RHO, RHOD, SUMR, SUMZ, Z, YAW, YAWD, LOW, ER, EZ, FR, FZ, T, D,
-    KRR, KRZ, KZZ, KR3, KZ3, K33, BR, BZ, B3, FREE, GAIN,
+    KRR, KRZ, KZZ, BR, BZ, B3, FREE, GAIN,
 ) = (U(W * row) for row in range(SLOTS))  # fmt: skip
 # Slots that one pass is done with serve the next: `inward` turns FR, FZ, T into I_f3 and r.
 IR3, IZ3, R = FR, FZ, T
 AR, AZ, ALPHA = CR, CZ, C3 = KRR, KRZ, KZZ
-HEIGHT, RATE, GRAM = K33, BR, BZ
+HEIGHT, RATE, GRAM = B3, BR, BZ
 Y = W * SLOTS
 # One row more, so that a slot of neighbouring records does not fall on the same cache lines.
 STRIDE = W * (SLOTS + MAXIMUM_ELBOWS + 1)
@@ -99,10 +99,10 @@ TAIL = W * ((MAXIMUM_ELBOWS + 1) * MAXIMUM_ELBOWS + 3)
 # Everything above that is measured in lanes, and the templates that are inlined into their callers.
 SCALED = (
     "W", "LANES", "Y", "STRIDE", "NEXT", "FORCES", "BELOW", "SHIFT", "ACTIVE", "TAIL",
-    "Q", "QD", "I", "Q0", "QD0", "I0", "QA", "QDA", "IA", "ELECTRICAL", "DRAWN", "COPPER", "FRICTION", "WORK", "V",
+    "Q", "QD", "I", "Q0", "QD0", "I0", "QDA", "IA", "ELECTRICAL", "DRAWN", "COPPER", "FRICTION", "WORK", "V",
     "LENGTH", "MASS", "END_INERTIA", "DIFFERENCE", "AXIAL", "ROTOR", "KM", "DAMPING", "MOTOR_DAMPING", "RESISTANCE",
     "INVERSE_L", "GRAVITY", "PAYLOAD", "PHI", "OMEGA", "SPIN", "RHO", "RHOD", "SUMR", "SUMZ", "Z", "YAW", "YAWD", "LOW",
-    "ER", "EZ", "FR", "FZ", "T", "D", "KRR", "KRZ", "KZZ", "KR3", "KZ3", "K33", "BR", "BZ", "B3", "FREE", "GAIN",
+    "ER", "EZ", "FR", "FZ", "T", "D", "KRR", "KRZ", "KZZ", "BR", "BZ", "B3", "FREE", "GAIN",
     "IR3", "IZ3", "R", "AR", "AZ", "ALPHA", "CR", "CZ", "C3", "HEIGHT", "RATE", "GRAM",
 )  # fmt: skip
 INLINED = ("sincos", "joint", "stage")
@@ -113,8 +113,9 @@ def sincos(x):
     turns = (x * _TWO_OVER_PI + _ROUND) - _ROUND
     y = ((x - turns * _PIO2_1) - turns * _PIO2_2) - turns * _PIO2_3
     z = y * y
-    sine = y + y * z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * _S6)))))
-    cosine = 1.0 - (0.5 * z - z * z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6))))))
+    zz = z * z
+    sine = y + y * z * ((_S1 + z * _S2) + zz * ((_S3 + z * _S4) + zz * (_S5 + z * _S6)))
+    cosine = 1.0 - (0.5 * z - zz * ((_C1 + z * _C2) + zz * ((_C3 + z * _C4) + zz * (_C5 + z * _C6))))
     quadrant = turns - 4.0 * ((turns * 0.25 + _ROUND) - _ROUND)  # -2, -1, 0, 1 or 2
     odd = abs(quadrant) == 1.0
     s = cosine if odd else sine
@@ -265,8 +266,12 @@ def newton(ws, tail, elbows):
         for k in range(lanes):
             scale = tail[ACTIVE + k] / ws[o + GRAM + k]
             height = ws[o + HEIGHT + k] * scale
+            rate = ws[o + RATE + k] * scale
             ws[o + HEIGHT + k] = height
-            ws[o + RATE + k] *= scale
+            ws[o + RATE + k] = rate
+            # The next segment counts its pitch from here, and its first joint is about to take the shift back.
+            ws[o + PHI + k] += ws[o + ER + k] * height
+            ws[o + OMEGA + k] += ws[o + ER + k] * rate
             tail[SHIFT + k] = max(tail[SHIFT + k], abs(height))
         # Tip to base: a link's own absolute shift, which the link after it takes back from its relative angle.
         for a in range(last, first - 1, -1):
@@ -319,7 +324,7 @@ def outward(ws, n):
             ws[o + SUMZ + k] = sumz - hc * ww
             ws[o + Z + k] = z
             ws[o + LOW + k] = min(ws[o - NEXT + LOW + k], z)
-            ws[o + YAW + k] = ws[o - NEXT + YAW + k] + m * rho * rho + difference * s * s + ws[o + AXIAL + k]
+            ws[o + YAW + k] = ws[o - NEXT + YAW + k] + (m * rho * rho + (difference * s * s + ws[o + AXIAL + k]))
             ws[o + YAWD + k] = ws[o - NEXT + YAWD + k] + 2.0 * (m * rho * rhod + dsc * w)
             ws[o + ER + k] = 2.0 * hc
             ws[o + EZ + k] = -2.0 * hs
@@ -336,9 +341,9 @@ def inward(ws, n):
         ws[o + KRR + k] = load
         ws[o + KRZ + k] = 0.0
         ws[o + KZZ + k] = load
-        ws[o + KR3 + k] = 0.0
-        ws[o + KZ3 + k] = 0.0
-        ws[o + K33 + k] = 0.0
+        ws[o + IR3 + k] = 0.0
+        ws[o + IZ3 + k] = 0.0
+        ws[o + D + k] = 0.0
         ws[o + BR + k] = load * (ws[o - NEXT + SUMR + k] - ws[o - NEXT + RHO + k] * ws[o - NEXT + SPIN + k])
         ws[o + BZ + k] = load * (ws[o - NEXT + SUMZ + k] + ws[o - NEXT + GRAVITY + k])
         ws[o + B3 + k] = 0.0
@@ -352,26 +357,25 @@ def inward(ws, n):
             krr = ws[o + NEXT + KRR + k]
             krz = ws[o + NEXT + KRZ + k]
             kzz = ws[o + NEXT + KZZ + k]
-            kr3 = ws[o + NEXT + KR3 + k]
-            kz3 = ws[o + NEXT + KZ3 + k]
+            # The rest's rotational inertia, out of what the joint after this one keeps anyway: stores cost most here.
+            jd = ws[o + NEXT + ROTOR + k] * ws[o + NEXT + D + k]
+            kr3 = jd * ws[o + NEXT + IR3 + k]
+            kz3 = jd * ws[o + NEXT + IZ3 + k]
+            k33 = ws[o + NEXT + ROTOR + k] - ws[o + NEXT + ROTOR + k] * jd
             br = ws[o + NEXT + BR + k]
             bz = ws[o + NEXT + BZ + k]
             gr = krr * er + krz * ez + kr3
             gz = krz * er + kzz * ez + kz3
             ir3 = 0.5 * m * er + gr
             iz3 = 0.5 * m * ez + gz
-            i33 = ws[o + END_INERTIA + k] + er * (gr + kr3) + ez * (gz + kz3) + ws[o + NEXT + K33 + k]
+            i33 = (ws[o + END_INERTIA + k] + k33) + (er * (gr + kr3) + ez * (gz + kz3))
             u = ws[o + KM + k] * ws[o + I + k] - ws[o + DAMPING + k] * ws[o + QD + k]
-            r = u - (ws[o + T + k] + er * br + ez * bz + ws[o + NEXT + B3 + k])
+            r = (u - ws[o + T + k] - ws[o + NEXT + B3 + k]) - (er * br + ez * bz)
             d = 1.0 / (i33 + j)
-            dj = d * j
             dr = d * r
             ws[o + KRR + k] = m + krr - d * ir3 * ir3
             ws[o + KRZ + k] = krz - d * ir3 * iz3
             ws[o + KZZ + k] = m + kzz - d * iz3 * iz3
-            ws[o + KR3 + k] = dj * ir3
-            ws[o + KZ3 + k] = dj * iz3
-            ws[o + K33 + k] = j - j * dj
             ws[o + BR + k] = ws[o + FR + k] + br + dr * ir3
             ws[o + BZ + k] = ws[o + FZ + k] + bz + dr * iz3
             ws[o + B3 + k] = u - j * dr
@@ -440,7 +444,7 @@ def brace(ws, tail, elbows):
             for k in range(LANES):
                 cr = ws[o + NEXT + CR + k]
                 cz = ws[o + NEXT + CZ + k]
-                y = -(ws[o + ER + k] * cr + ws[o + EZ + k] * cz + ws[o + NEXT + C3 + k])
+                y = -((ws[o + ER + k] * cr + ws[o + EZ + k] * cz) + ws[o + NEXT + C3 + k])
                 dy = ws[o + D + k] * y
                 ws[o + CR + k] = cr + dy * ws[o + IR3 + k]
                 ws[o + CZ + k] = cz + dy * ws[o + IZ3 + k]
@@ -478,7 +482,10 @@ def evaluate(ws, tail, n, elbows):
 
 
 def joint(ws, o, k, q_ddot, weight, ahead, first, last):
-    """Adds one RK4 stage of a joint to the step's increments and meters, and sets its next state."""
+    """Adds one RK4 stage of a joint to the step's increments and meters, and sets its next state.
+
+    `weight` is the stage's share of the step [s], `ahead` how far off the next stage is, in the last one the step.
+    """
     q = ws[o + Q + k] if first else ws[o + Q0 + k]
     q_dot = ws[o + QD + k]
     i = ws[o + I + k]
@@ -495,7 +502,6 @@ def joint(ws, o, k, q_ddot, weight, ahead, first, last):
     ws[o + COPPER + k] += weight * (resistance * i * i)
     ws[o + FRICTION + k] += weight * (ws[o + DAMPING + k] * q_dot * q_dot)
     ws[o + WORK + k] += weight * (torque * q_dot)
-    qa = weight * q_dot
     qda = weight * q_ddot
     ia = weight * i_dot
     if first:
@@ -503,16 +509,22 @@ def joint(ws, o, k, q_ddot, weight, ahead, first, last):
         ws[o + QD0 + k] = qd
         ws[o + I0 + k] = i0
     else:
-        qa += ws[o + QA + k]
         qda += ws[o + QDA + k]
         ia += ws[o + IA + k]
-    if not last:
-        ws[o + QA + k] = qa
+    if last:
+        # The angle's own increment, out of what the stages left behind: one row less to keep.
+        shift = ahead * qd
+        ws[o + Q + k] = (
+            q + (shift + ahead * ws[o + QDA + k]) - (ws[o + Q + k] - q - shift) * (1.0 / 3.0) - weight * (q_dot - qd)
+        )
+        ws[o + QD + k] = qd + qda
+        ws[o + I + k] = i0 + ia
+    else:
         ws[o + QDA + k] = qda
         ws[o + IA + k] = ia
-    ws[o + Q + k] = q + (qa if last else ahead * q_dot)
-    ws[o + QD + k] = qd + (qda if last else ahead * q_ddot)
-    ws[o + I + k] = i0 + (ia if last else ahead * i_dot)
+        ws[o + Q + k] = q + ahead * q_dot
+        ws[o + QD + k] = qd + ahead * q_ddot
+        ws[o + I + k] = i0 + ahead * i_dot
 
 
 def stage(ws, n, weight, ahead, first, last):
@@ -532,8 +544,8 @@ def stage(ws, n, weight, ahead, first, last):
             ar = ws[o - NEXT + AR + k]
             az = ws[o - NEXT + AZ + k]
             before = ws[o - NEXT + ALPHA + k]
-            rest = ws[o + R + k] - ws[o + IR3 + k] * ar - ws[o + IZ3 + k] * az
-            alpha = ws[o + D + k] * (rest + ws[o + ROTOR + k] * before)
+            load = ws[o + IR3 + k] * ar + ws[o + IZ3 + k] * az
+            alpha = ws[o + D + k] * ((ws[o + R + k] + ws[o + ROTOR + k] * before) - load)
             ws[o + ALPHA + k] = alpha
             ws[o + AR + k] = ar + ws[o + ER + k] * alpha
             ws[o + AZ + k] = az + ws[o + EZ + k] * alpha
@@ -553,6 +565,14 @@ def middle_stage(ws, n, weight, ahead):
 def last_stage(ws, n, weight, ahead):
     """Stage 4, whose next state is the step's end."""
     stage(ws, n, weight, ahead, False, True)
+
+
+def workspace(n):
+    """Zeroed records of joints and tip, and a block's rows, on cache lines' edges, which vectors must not straddle."""
+    whole = np.zeros((n + 1) * STRIDE + TAIL + 8)
+    edge = (-whole.ctypes.data % 64) // 8
+    ws = whole[edge : edge + (n + 1) * STRIDE]
+    return ws, whole[edge + (n + 1) * STRIDE : edge + (n + 1) * STRIDE + TAIL]
 
 
 def load(ws, n, start, state, parameters, voltage):
@@ -613,8 +633,7 @@ def advance(state, parameters, voltage, elbows, first, end, n_steps, step, summa
     """
     invalid = 0
     n = state.shape[2]
-    ws = np.zeros((n + 1) * STRIDE)
-    tail = np.zeros(TAIL)
+    ws, tail = workspace(n)
     tip = U((n - 1) * STRIDE)
     for start in range(first, end, W):
         load(ws, n, start, state[:end], parameters, voltage)
@@ -630,7 +649,7 @@ def advance(state, parameters, voltage, elbows, first, end, n_steps, step, summa
             evaluate(ws, tail, n, elbows)
             middle_stage(ws, n, step / 3.0, step)
             evaluate(ws, tail, n, elbows)
-            last_stage(ws, n, step / 6.0, 0.0)
+            last_stage(ws, n, step / 6.0, step)
             project(ws, tail, elbows)
             # Its summary is the end of this step, its accelerations the first stage of the next.
             evaluate(ws, tail, n, elbows)
@@ -643,8 +662,7 @@ def advance(state, parameters, voltage, elbows, first, end, n_steps, step, summa
 def accelerations(state, parameters, voltage, elbows, q_ddot, current_dot, elbow_force):
     """Right-hand side of eq. 17 at each arm's state: q_ddot and current_dot (B, n), elbow_force (B, p)."""
     n = state.shape[2]
-    ws = np.zeros((n + 1) * STRIDE)
-    tail = np.zeros(TAIL)
+    ws, tail = workspace(n)
     for start in range(0, state.shape[0], W):
         load(ws, n, start, state, parameters, voltage)
         evaluate(ws, tail, n, elbows)
@@ -661,8 +679,7 @@ def accelerations(state, parameters, voltage, elbows, q_ddot, current_dot, elbow
 def settle(q, parameters, elbows):
     """Moves poses q (B, n) onto the elbows' plane in place, as far as Newton's method gets."""
     n = q.shape[1]
-    ws = np.zeros((n + 1) * STRIDE)
-    tail = np.zeros(TAIL)
+    ws, tail = workspace(n)
     for start in range(0, q.shape[0], W):
         for lane in range(W):
             arm = min(start + lane, q.shape[0] - 1)
@@ -695,7 +712,7 @@ def kernel(lanes: int) -> Kernel:
     space.update({name: type(space[name])(int(space[name]) * lanes // W) for name in SCALED})
     templates = (
         sincos, newton, project, outward, inward, solve, brace, evaluate, joint, stage, first_stage, middle_stage,
-        last_stage, load, unload, advance, accelerations, settle,
+        last_stage, workspace, load, unload, advance, accelerations, settle,
     )  # fmt: skip
     for template in templates:
         name = template.__name__
