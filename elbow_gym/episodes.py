@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,8 @@ from elbow_gym.simulator import Simulator
 
 RESET_OPTIONS = ("state", "phase")
 STATE_ENTRIES = ("q", "q_dot", "current")
+# The last figure is the reward itself.
+INFO_FIGURES = kernel.FIGURES[:-1]
 
 
 class Outcome(NamedTuple):
@@ -60,7 +62,7 @@ class Episodes:
         self._path = np.repeat(self.circle.path[None], num_envs, axis=0)
         self._n_substeps, self._horizon = settings.n_substeps, settings.horizon
         self._turn = self.circle.rate * settings.control_period
-        self._lookahead = self.circle.rate * task.LOOKAHEAD
+        self._lookahead = np.full(num_envs, self.circle.rate * task.LOOKAHEAD)
         self._volts = 1.0 if settings.action_unit == "volt" else float(settings.voltage_limit)
         self._highest = float(settings.voltage_limit) / self._volts
         self._phase = np.zeros(num_envs)
@@ -149,65 +151,57 @@ class Episodes:
 
         Raises ValueError, with the state untouched, when an action is not a number.
         """
-        settings, simulator = self.settings, self.simulator
         voltage = np.empty_like(action)
         if not kernel.drive(action, self._highest, self._volts, voltage):
             raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
-        invalid = simulator.advance(voltage, self._n_substeps)
         self._steps += 1
-        sight = self.look()
-        total = sight.electrical_energy if settings.regeneration else sight.drawn_energy
-        power = (total - self._spent) * settings.control_frequency
-        self._spent = total.copy()
-        tracking, energy = task.reward_terms(sight.tracking_error, power, self.tracking_weight, self.energy_weight)
+        settings = self.settings
+        price = task.Price(self.tracking_weight, self.energy_weight, settings.control_frequency, settings.regeneration)
+        sight, look = self._looking(price)
+        invalid = self.simulator.advance(voltage, self._n_substeps, look)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
         truncated = self._steps >= self._horizon
         if invalid:
-            terminated = ~simulator.valid
-            tracking, energy = self._charge_the_rest(terminated, tracking, energy)
+            terminated = ~self.simulator.valid
+            self._charge_the_rest(terminated, sight)
             truncated &= ~terminated
-        info = self.info(sight, voltage, power, tracking, energy)
-        return Outcome(sight.observation, tracking + energy, terminated, truncated, info)
+        info = self.info(sight, voltage)
+        return Outcome(sight.observation, sight.figure("reward"), terminated, truncated, info)
 
-    def _charge_the_rest(self, terminated: NDArray[np.bool_], tracking: Array, energy: Array) -> tuple[Array, Array]:
+    def _charge_the_rest(self, terminated: NDArray[np.bool_], sight: task.Sight) -> None:
         """Ending early never pays: the remaining time costs the worst that the observation's bounds allow."""
         bound = self.layout.high * self.layout.scale
         worst_error = np.linalg.norm(bound[self.layout.slices["hand_error"]])
         worst_power = self.settings.voltage_limit * bound[self.layout.slices["current"]].sum()
-        rest = np.maximum(self.settings.horizon - self._steps + 1, 1)
-        return (
-            np.where(terminated, -self.tracking_weight * worst_error * rest, tracking),
-            np.where(terminated, -self.energy_weight * worst_power * rest, energy),
-        )
+        rest = np.maximum(self.settings.horizon - self._steps + 1, 1)[terminated]
+        tracking, energy = -self.tracking_weight * worst_error * rest, -self.energy_weight * worst_power * rest
+        for name, values in (
+            ("reward_tracking", tracking),
+            ("reward_energy", energy),
+            ("reward", tracking + energy),
+        ):
+            sight.figure(name)[terminated] = values
 
     def angle(self) -> Array:
         """The target's angle on the circle now [rad], (B,)."""
         return self._phase + np.multiply(self._turn, self._steps, dtype=np.float64)
 
-    def look(self) -> task.Sight:
-        """What is seen of every arm now."""
-        return task.look(self.layout, self.simulator, self.pose, self._path, self.angle(), self._lookahead)
+    def _looking(self, price: task.Price) -> tuple[task.Sight, Callable[[int, int], None]]:
+        target = task.Target(self._path, self.angle(), self._lookahead)
+        return task.looking(self.layout, self.simulator, self.pose, target, price, self._spent)
 
-    def info(
-        self,
-        sight: task.Sight,
-        voltage: Array | None = None,
-        power: Array | None = None,
-        reward_tracking: Array | None = None,
-        reward_energy: Array | None = None,
-    ) -> dict[str, Array]:
-        """Fresh arrays of the step's figures, one row per arm; after a reset, where none are given, flows are zero."""
+    def look(self) -> task.Sight:
+        """What is seen of every arm now, between control steps: power and rewards are zero."""
+        sight, look = self._looking(task.Price(0.0, 0.0, 0.0, self.settings.regeneration))
+        look(0, self.num_envs)
+        return sight
+
+    def info(self, sight: task.Sight, voltage: Array | None = None) -> dict[str, Array]:
+        """Fresh arrays of the step's figures, one row per arm; the voltage is zero when None, after a reset."""
         return {
-            "tracking_error": sight.tracking_error,
-            "electrical_power": np.zeros(self.num_envs) if power is None else power,
-            "electrical_energy": sight.electrical_energy,
-            "drawn_energy": sight.drawn_energy,
-            "link_work": sight.link_work,
-            "reward_tracking": np.zeros(self.num_envs) if reward_tracking is None else reward_tracking,
-            "reward_energy": np.zeros(self.num_envs) if reward_energy is None else reward_energy,
+            **dict(zip(INFO_FIGURES, sight.figures, strict=False)),
             "voltage": np.zeros((self.num_envs, self.arm.n_joints)) if voltage is None else voltage,
             "elbow_force": self.simulator.elbow_force.copy(),
-            "below_table": sight.below_table,
         }
 
     def get_state(self) -> dict[str, Any]:

@@ -48,7 +48,17 @@ PARAMETER_ROWS = len(PARAMETERS)
 # below the table (accumulated), 1 while the state is representable, then one force per elbow.
 HAND, LOWEST, BELOW_TABLE, VALID, SUMMARY_COLUMNS = 0, 3, 4, 5, 6
 # Rows that `observe` fills beside the observation.
-FIGURES = ("tracking_error", "electrical_energy", "drawn_energy", "link_work", "below_table")
+FIGURES = (
+    "tracking_error",
+    "electrical_power",
+    "electrical_energy",
+    "drawn_energy",
+    "link_work",
+    "reward_tracking",
+    "reward_energy",
+    "below_table",
+    "reward",
+)
 # Beyond this angle [rad] the sine loses digits; an arm gets there only by blowing up.
 LARGEST_ANGLE = 1e5
 # Elbows rest at z = 0 to 1e-8 m; lower than this is under the table.
@@ -165,19 +175,24 @@ def _path(coefficients, angle, out):
         _path_point(coefficients, c, s, out[i])
 
 
-def _observe(state, summary, pose, coefficients, angle, lookahead, scale, high, observation, figures):
-    """Fills observation (B, size) float32 and the rows FIGURES of figures, (5, B).
+def _observe(
+    state, summary, pose, coefficients, angle, lookahead, scale, high, price, spent, observation, figures, first, end
+):
+    """Fills observation (B, size) float32 and the rows FIGURES of figures, (9, B), for arms first..end-1.
 
-    coefficients (B, rows, 3) and angle (B,) are each arm's path and where the target stands on it; lookahead is an
-    angle. In compiled code so that an arm's bits do not depend on how many others there are.
+    coefficients (B, rows, 3) and angle (B,) are each arm's path and where the target stands on it, lookahead (B,) the
+    angle to what it looks ahead to. price is the tracking weight [1/m], the energy weight [1/W], the control frequency
+    [Hz] and whether negative power counts; spent (B,) is the energy paid before [J], and is brought up to date.
+    In compiled code so that an arm's bits do not depend on how many others there are.
     """
     n = state.shape[2]
     later = np.empty(3)
     target = np.empty(3)
-    for b in range(state.shape[0]):
+    tracking_weight, energy_weight, frequency, regeneration = price
+    for b in range(first, end):
         s, c = _sincos(angle[b])
         _path_point(coefficients[b], c, s, target)
-        s_later, c_later = _sincos(angle[b] + lookahead)
+        s_later, c_later = _sincos(angle[b] + lookahead[b])
         _path_point(coefficients[b], c_later, s_later, later)
         squared = 0.0
         for m in range(observation.shape[1]):
@@ -198,13 +213,19 @@ def _observe(state, summary, pose, coefficients, angle, lookahead, scale, high, 
             else:
                 value = c if m == 3 * n + 9 else s
             observation[b, m] = min(max(np.float32(value / scale[m]), -high[m]), high[m])
-        figures[0, b] = np.sqrt(squared)
-        figures[4, b] = summary[b, BELOW_TABLE]
-        for column, row in ((1, 3), (2, 4), (3, 7)):
+        for row, meter in ((2, 3), (3, 4), (4, 7)):
             total = 0.0
             for a in range(n):
-                total += state[b, row, a]
-            figures[column, b] = total
+                total += state[b, meter, a]
+            figures[row, b] = total
+        paid = figures[2, b] if regeneration else figures[3, b]
+        figures[0, b] = np.sqrt(squared)
+        figures[1, b] = (paid - spent[b]) * frequency
+        figures[5, b] = 0.0 - tracking_weight * figures[0, b]
+        figures[6, b] = 0.0 - energy_weight * figures[1, b]
+        figures[7, b] = summary[b, BELOW_TABLE]
+        figures[8, b] = figures[5, b] + figures[6, b]
+        spent[b] = paid
 
 
 Compiled = Callable[..., Any]

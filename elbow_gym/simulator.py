@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import numbers
-from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from elbow_gym import kernel
 from elbow_gym.kinematics import constraint_jacobian, elbow_heights
 from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows, positive
+from elbow_gym.sharing import Sharing
 from elbow_gym.tables import as_batch, parameter_table
 
 # Explicit RK4 is stable up to 2.785 / rate; the fastest rate of this family is the armature's R / L.
@@ -77,14 +76,11 @@ class Simulator:
         # Up to two arms the lanes of a block would mostly idle.
         lanes = 1 if self.num_envs <= 2 else kernel.BLOCK_LANES
         self._advance, _, self._settle = kernel.kernel(lanes)
-        blocks = -(-self.num_envs // lanes)
-        edges = np.linspace(0, blocks, min(self._num_threads, blocks) + 1).round().astype(int) * lanes
-        self._shares = [(int(a), min(int(b), self.num_envs)) for a, b in itertools.pairwise(edges)]
-        self._pool = ThreadPoolExecutor(len(self._shares) - 1) if len(self._shares) > 1 else None
+        self._sharing = Sharing(self.num_envs, lanes, self._num_threads)
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the compiled functions and the threads, for pickling and copying."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("_advance", "_settle", "_pool")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("_advance", "_settle", "_sharing")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -177,27 +173,29 @@ class Simulator:
             raise ValueError(f"n_substeps must be a positive integer, got {n_substeps!r}")
         self.advance(np.array(voltage, order="C"), int(n_substeps))
 
-    def advance(self, voltage: Array, n_substeps: int) -> int:
+    def advance(self, voltage: Array, n_substeps: int, then: Callable[[int, int], Any] | None = None) -> int:
         """`step` without its checks, for callers that made them: a contiguous float64 (B, n) of finite volts.
 
+        Each thread calls `then` with the first and the end of its share of the arms when it has moved them.
         Returns the number of arms that are not `valid`.
         """
         self._steps += n_substeps
-        return self._run(voltage, n_substeps)
+        return self._run(voltage, n_substeps, then)
 
     @property
     def raw(self) -> tuple[Array, Array]:
         """The kernel's own state and summary arrays, for functions that only read them."""
         return self._state, self._summary
 
-    def _run(self, voltage: Array, n_substeps: int) -> int:
-        def run(share: tuple[int, int]) -> int:
+    def _run(self, voltage: Array, n_substeps: int, then: Callable[[int, int], Any] | None = None) -> int:
+        def run(first: int, end: int) -> int:
             fixed = (self._state, self._parameters, voltage, self._elbow_index)
-            return self._advance(*fixed, *share, n_substeps, self.timestep, self._summary)
+            invalid = self._advance(*fixed, first, end, n_substeps, self.timestep, self._summary)
+            if then is not None:
+                then(first, end)
+            return invalid
 
-        # This thread takes the first share itself: one hand-over less.
-        others = [self._pool.submit(run, share) for share in self._shares[1:]] if self._pool is not None else []
-        return run(self._shares[0]) + sum(other.result() for other in others)
+        return self._sharing.total(run)
 
     def get_state(self) -> dict[str, NDArray[Any]]:
         """A copy of everything that runs on; `set_state` continues from it bit for bit."""

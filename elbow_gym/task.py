@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -92,49 +93,62 @@ class ObservationLayout:
         return {name: quantities[..., where] for name, where in self.slices.items()}
 
 
+class Target(NamedTuple):
+    """What the hands of B arms should follow, at an instant."""
+
+    path: Array
+    """Each arm's path as Fourier rows [m], (B, rows, 3)."""
+    angle: Array
+    """Where the target stands on it [rad], (B,)."""
+    lookahead: Array
+    """Angle between the target and the look-ahead target [rad], (B,)."""
+
+
+class Price(NamedTuple):
+    """What the reward charges."""
+
+    tracking_weight: float
+    """Per metre of tracking error at the end of a control step [1/m]."""
+    energy_weight: float
+    """Per watt of mean electrical power over it [1/W]."""
+    control_frequency: float
+    """Control steps per second [Hz]."""
+    regeneration: bool
+    """Whether negative power is credited."""
+
+
 class Sight(NamedTuple):
-    """What is seen of B arms at an instant."""
+    """What is seen of B arms at an instant, and what the control step that ends there is paid."""
 
     observation: NDArray[np.float32]
     """(B, size), scaled and saturated."""
-    tracking_error: Array
-    """Distance of the hand from the target [m], (B,)."""
-    electrical_energy: Array
-    """Sum over the joints since the reset [J], (B,); signed."""
-    drawn_energy: Array
-    """The same of the positive power alone [J], (B,)."""
-    link_work: Array
-    """Sum over the joints since the reset [J], (B,)."""
-    below_table: Array
-    """Time under the table since the reset [s], (B,)."""
+    figures: Array
+    """Rows of `kernel.FIGURES`: energies [J] and time under the table [s] since the reset, summed over the joints."""
+
+    def figure(self, name: str) -> Array:
+        """A row of the figures by name, (B,)."""
+        return self.figures[kernel.FIGURES.index(name)]
 
 
-def look(
-    layout: ObservationLayout, simulator: Simulator, pose: Array, path: Array, angle: Array, lookahead: float
-) -> Sight:
-    """The observation of every arm and the figures that its reward is made of.
+def looking(
+    layout: ObservationLayout, simulator: Simulator, pose: Array, target: Target, price: Price, spent: Array
+) -> tuple[Sight, Callable[[int, int], None]]:
+    """A sight still empty, and the function that fills its rows of arms first..end-1 when they have moved.
 
     Args:
         layout: the observation's entries.
         simulator: the arms.
         pose: what joint angles are counted from [rad], (n,).
-        path: each arm's target path as Fourier rows [m], (B, rows, 3).
-        angle: where each target stands on its path [rad], (B,).
-        lookahead: angle between the target and the look-ahead target [rad].
+        target: what the hands should follow.
+        price: the reward's terms are -tracking_weight |hand - target| and -energy_weight P.
+        spent: energy paid before this control step [J], (B,), brought up to date.
     """
     arms = simulator.num_envs
-    seen, figures = np.empty((arms, layout.size), np.float32), np.empty((len(kernel.FIGURES), arms))
-    kernel.observe(*simulator.raw, pose, path, angle, lookahead, layout.scale, layout.high, seen, figures)
-    return Sight(seen, *figures)
+    sight = Sight(np.empty((arms, layout.size), np.float32), np.empty((len(kernel.FIGURES), arms)))
 
+    def look(first: int, end: int) -> None:
+        kernel.observe(
+            *simulator.raw, pose, *target, layout.scale, layout.high, tuple(price), spent, *sight, first, end
+        )
 
-def reward_terms(error: Array, power: Array, tracking_weight: float, energy_weight: float) -> tuple[Array, Array]:
-    """The two terms of the reward, each (B,): -tracking_weight |hand - target| and -energy_weight P.
-
-    Args:
-        error: tracking error at the end of the control step [m].
-        power: mean electrical power over it [W].
-        tracking_weight: [1/m].
-        energy_weight: [1/W].
-    """
-    return -tracking_weight * error, -energy_weight * power
+    return sight, look

@@ -10,6 +10,7 @@ ARM = paper_arm()
 CIRCLE = Circle(plane="radial", radius=0.2, period=4.0)
 ANGLE = np.array([0.3, -2.0, 7.0])
 POSE = np.array(ARM.nominal_pose)
+FREE = task.Price(0.0, 0.0, 0.0, regeneration=True)
 LAYOUT = task.ObservationLayout(10)
 FEATURES = {feature.name: feature for feature in task.FEATURES}
 
@@ -23,9 +24,13 @@ def arms():
     return simulator
 
 
-def look(simulator):
+def look(simulator, price=FREE, spent=0.0):
     path = np.repeat(CIRCLE.path[None], 3, axis=0)
-    return task.look(LAYOUT, simulator, POSE, path, ANGLE, CIRCLE.rate * task.LOOKAHEAD)
+    target = task.Target(path, ANGLE, np.full(3, CIRCLE.rate * task.LOOKAHEAD))
+    paid = np.full(3, spent)
+    sight, fill = task.looking(LAYOUT, simulator, POSE, target, price, paid)
+    fill(0, 3)
+    return sight
 
 
 def truth(simulator):
@@ -108,18 +113,29 @@ def test_bounds_saturate_the_observation_and_never_the_state():
 def test_figures_are_the_error_norm_and_the_meters_summed_over_the_joints():
     simulator = arms()
     sight = look(simulator)
-    np.testing.assert_allclose(sight.tracking_error, np.linalg.norm(truth(simulator)["hand_error"], axis=1), rtol=1e-13)
+    error = np.linalg.norm(truth(simulator)["hand_error"], axis=1)
+    np.testing.assert_allclose(sight.figure("tracking_error"), error, rtol=1e-13)
     for name in ("electrical_energy", "drawn_energy", "link_work"):
-        np.testing.assert_allclose(getattr(sight, name), getattr(simulator, name).sum(axis=1), rtol=1e-13)
+        np.testing.assert_allclose(sight.figure(name), getattr(simulator, name).sum(axis=1), rtol=1e-13)
 
 
-def test_one_watt_weighs_one_millimetre_by_default():
-    tracking, energy = task.reward_terms(np.array([0.001, 0.0]), np.array([0.0, 1.0]), 1.0, 0.001)
-    np.testing.assert_array_equal(tracking, [-0.001, 0.0])
-    np.testing.assert_array_equal(energy, [0.0, -0.001])
+@pytest.mark.parametrize(("regeneration", "meter"), [(True, "electrical_energy"), (False, "drawn_energy")])
+def test_reward_terms_are_weight_times_error_and_mean_power(regeneration, meter):
+    simulator = arms()
+    sight = look(simulator, task.Price(3.0, 0.25, 50.0, regeneration), spent=2.0)
+    power = (getattr(simulator, meter).sum(axis=1) - 2.0) * 50.0
+    np.testing.assert_allclose(sight.figure("electrical_power"), power, rtol=1e-12)
+    np.testing.assert_array_equal(sight.figure("reward_tracking"), -3.0 * sight.figure("tracking_error"))
+    np.testing.assert_array_equal(sight.figure("reward_energy"), -0.25 * sight.figure("electrical_power"))
+    terms = sight.figure("reward_tracking") + sight.figure("reward_energy")
+    np.testing.assert_array_equal(sight.figure("reward"), terms)
 
 
-def test_reward_terms_are_weight_times_quantity_and_regeneration_pays():
-    tracking, energy = task.reward_terms(np.array([0.5]), np.array([-4.0]), 3.0, 0.25)
-    np.testing.assert_array_equal(tracking, [-1.5])
-    np.testing.assert_array_equal(energy, [1.0])
+def test_a_look_between_steps_is_free_and_remembers_what_is_paid():
+    simulator, spent = arms(), np.zeros(3)
+    path = np.repeat(CIRCLE.path[None], 3, axis=0)
+    target = task.Target(path, ANGLE, np.zeros(3))
+    sight, fill = task.looking(LAYOUT, simulator, POSE, target, FREE, spent)
+    fill(0, 3)
+    np.testing.assert_array_equal(sight.figures[[1, 5, 6, 8]], 0.0)
+    np.testing.assert_allclose(spent, simulator.electrical_energy.sum(axis=1), rtol=1e-13)

@@ -215,7 +215,7 @@ def test_simulator_gets_contiguous_volts_whatever_the_actions_memory_order(monke
     env = ElbowArmVectorEnv(3)
     env.reset(seed=0)
     layouts = []
-    monkeypatch.setattr(env.episodes.simulator, "advance", lambda volts, _: layouts.append(volts.flags.c_contiguous))
+    monkeypatch.setattr(env.episodes.simulator, "advance", lambda volts, *_: layouts.append(volts.flags.c_contiguous))
     env.step(np.asfortranarray(actions(3, 1)[0]))
     assert layouts == [True]
 
@@ -248,3 +248,13 @@ def test_gymnasiums_episode_statistics_count_returns_and_lengths(mode):
 def test_wrong_argument_is_a_value_error_naming_it_and_its_value(name, value):
     with pytest.raises(ValueError, match=f"^{name} must be .*, got {value!r}$"):
         ElbowArmVectorEnv(**{name: value})
+
+
+def test_resetting_one_arm_leaves_what_the_others_have_paid():
+    env = ElbowArmVectorEnv(2, regeneration=False, autoreset_mode="Disabled")
+    env.reset(seed=0)
+    _, _, _, _, before = env.step(actions(2, 1)[0])
+    env.reset(options={"reset_mask": np.array([True, False])})
+    _, _, _, _, after = env.step(-actions(2, 1)[0])
+    drawn = after["drawn_energy"][1] - before["drawn_energy"][1]
+    assert after["electrical_power"][1] == pytest.approx(50.0 * drawn, rel=1e-12)
