@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from elbow_gym.env import ElbowArmEnv
     from elbow_gym.parameters import ArmParameters, LinkParameters, MotorParameters, paper_arm
     from elbow_gym.simulator import Simulator
+    from elbow_gym.table import TableParameters
     from elbow_gym.vector_env import ElbowArmVectorEnv
 
 __version__ = "0.1.0"
@@ -25,6 +26,7 @@ _HOMES = {
     "LinkParameters": "parameters",
     "MotorParameters": "parameters",
     "Simulator": "simulator",
+    "TableParameters": "table",
     "paper_arm": "parameters",
 }
 
@@ -36,6 +38,7 @@ __all__ = [
     "LinkParameters",
     "MotorParameters",
     "Simulator",
+    "TableParameters",
     "paper_arm",
 ]
 

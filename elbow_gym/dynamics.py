@@ -11,8 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elbow_gym.contact import contact_forces, contact_torque, elbow_drag
 from elbow_gym.kinematics import constraint_bias, constraint_jacobian
-from elbow_gym.parameters import ArmParameters, Array
+from elbow_gym.motors import armature_resistance, back_emf, coulomb_friction, motor_torque
+from elbow_gym.parameters import ArmParameters, Array, non_negative
+from elbow_gym.table import TableParameters
 
 __all__ = [
     "Acceleration",
@@ -36,20 +39,6 @@ class Acceleration(NamedTuple):
     """f_n of the table on each elbow along +z [N], shape (p,); negative when the table pulls."""
     current_dot: Array
     """Rates of the armature currents [A/s], shape (n,)."""
-
-
-def back_emf(arm: ArmParameters, q_dot: ArrayLike) -> Array:
-    """Back-EMF at the motor terminals [V], shape (n,): K k q_dot.   Eqs 2, 7."""
-    return arm.of_motors("joint_torque_constant") * np.asarray(q_dot, dtype=np.float64)
-
-
-def motor_torque(arm: ArmParameters, q_dot: ArrayLike, q_ddot: ArrayLike, current: ArrayLike) -> Array:
-    """Tau that the geared motors pass on to the links [N m], shape (n,): K_m i - J_m q_ddot - D_m q_dot.   Eq. 12."""
-    return (
-        arm.of_motors("joint_torque_constant") * np.asarray(current, dtype=np.float64)
-        - arm.of_motors("reflected_inertia") * np.asarray(q_ddot, dtype=np.float64)
-        - arm.of_motors("reflected_viscous_friction") * np.asarray(q_dot, dtype=np.float64)
-    )
 
 
 def _rotations(q: Array) -> Array:
@@ -128,6 +117,10 @@ def forward_dynamics(
     current: ArrayLike,
     voltage: ArrayLike,
     elbows: Sequence[int] = (),
+    *,
+    table: TableParameters | None = None,
+    elbow_friction: float = 0.0,
+    temperature_rise: ArrayLike = 0.0,
 ) -> Acceleration:
     """Solves the (2n + p) system M* [q_ddot, f_n, i_dot] = b of arm, elbows and motors.   Eqs 17-21.
 
@@ -137,9 +130,13 @@ def forward_dynamics(
         q_dot: rates [rad/s], shape (n,).
         current: armature currents i [A], shape (n,).
         voltage: terminal voltages v [V], shape (n,).
-        elbows: joint numbers held at z = 0, bilateral and frictionless.
+        elbows: joint numbers held at z = 0, bilateral, and frictionless unless `elbow_friction` says otherwise.
+        table: the compliant table under joints 3..n and the hand, if there is one.
+        elbow_friction: Coulomb's coefficient of the elbows on their plane [-], where it pushes on them.
+        temperature_rise: of the windings above the ambient [K], shape (n,) or one for all.
 
     Raises:
+        ValueError: `elbow_friction` is negative.
         numpy.linalg.LinAlgError: the elbows' constraints are linearly dependent at `q`.
     """
     n, p = arm.n_joints, len(elbows)
@@ -154,8 +151,33 @@ def forward_dynamics(
         [
             arm.of_motors("joint_torque_constant") * current - bias_forces(arm, q, q_dot),
             -constraint_bias(arm, q, q_dot, elbows),
-            voltage - arm.of_motors("armature_resistance") * current - back_emf(arm, q_dot),
+            voltage - armature_resistance(arm, temperature_rise) * current - back_emf(arm, q_dot),
         ]
     )
+    right[:n] += coulomb_friction(arm, q_dot)
+    if table is not None:
+        right[:n] += contact_torque(arm, q, contact_forces(arm, table, q, q_dot))
+    if non_negative("elbow_friction", elbow_friction) > 0.0:
+        drag = elbow_drag(arm, q, q_dot, elbows, elbow_friction)
+        right[:n] += drag @ np.maximum(_rubbing_force(matrix, right, drag), 0.0)
     solution = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
     return Acceleration(solution[:n], solution[n : n + p], solution[n + p :])
+
+
+def _rubbing_force(matrix: Array, right: Array, drag: Array) -> Array:
+    """Elbow forces f_n [N], shape (p,), that agree with the friction they cause on the elbows that push.
+
+    Friction enters the columns of the *active* elbows, at first those that push without friction, then those that
+    push with it, until they stay the same. Under strong friction they may not; whoever calls then holds the friction of
+    the last round, which still opposes the sliding.
+    """
+    n, p = drag.shape
+    force = np.linalg.solve(matrix, right)[n : n + p]
+    for _ in range(p + 2):
+        active = force > 0.0
+        rubbing = matrix.copy()
+        rubbing[:n, n : n + p] -= drag * active
+        force = np.linalg.solve(rubbing, right)[n : n + p]
+        if ((force > 0.0) == active).all():
+            break
+    return np.asarray(force, dtype=np.float64)

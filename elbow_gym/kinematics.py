@@ -1,4 +1,4 @@
-"""Where the arm is: joint and hand positions, the elbows' height and its Jacobian, inverse kinematics.
+"""Where the arm is: joint and hand positions, the elbows' height, radius and Jacobians, inverse kinematics.
 
 Angles: `q` is relative; the pitch phi_k = q_2 + ... + q_k is measured from the vertical. Link k runs
 l_k sin(phi_k) outward along the radius that the yaw q_1 selects and l_k cos(phi_k) up.
@@ -49,6 +49,21 @@ def constraint_jacobian(arm: ArmParameters, q: ArrayLike, elbows: Sequence[int])
     jacobian = np.zeros((len(elbows), arm.n_joints))
     for row, elbow in enumerate(elbows):
         jacobian[row, 1 : elbow - 1] = np.cumsum(slope[1 : elbow - 1][::-1])[::-1]
+    return jacobian
+
+
+def radii(arm: ArmParameters, q: ArrayLike, joints: Sequence[int]) -> Array:
+    """Signed distance rho of joints from the yaw axis, along the arm's radius [m], shape (p,); n + 1 is the hand."""
+    rho = np.cumsum(arm.of_links("length") * np.sin(pitches(q)))
+    return rho[[joint - 2 for joint in joints]]
+
+
+def radial_jacobian(arm: ArmParameters, q: ArrayLike, joints: Sequence[int]) -> Array:
+    """J_rho = d rho/dq [m/rad], shape (p, n), of joints; n + 1 is the hand."""
+    slope = arm.of_links("length") * np.cos(pitches(q))
+    jacobian = np.zeros((len(joints), arm.n_joints))
+    for row, joint in enumerate(joints):
+        jacobian[row, 1 : joint - 1] = np.cumsum(slope[1 : joint - 1][::-1])[::-1]
     return jacobian
 
 

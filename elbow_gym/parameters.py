@@ -48,7 +48,7 @@ def _set(instance: object, name: str, value: object) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class MotorParameters:
-    """A DC servo motor behind a gear (eqs 1-12). All positive, the friction also zero."""
+    """A DC servo motor behind a gear (eqs 1-12). All positive; frictions and temperature_coefficient also zero."""
 
     armature_resistance: float = 1.1
     """R [ohm]."""
@@ -62,10 +62,21 @@ class MotorParameters:
     """k [-], motor turns per joint turn."""
     gear_viscous_friction: float = 0.01
     """d_m [N m s/rad], at the motor shaft."""
+    gear_coulomb_friction: float = 0.0
+    """T_c [N m], at the motor shaft."""
+    thermal_resistance: float = 5.0
+    """R_th [K/W], from the winding to the ambient."""
+    heat_capacity: float = 20.0
+    """C_th [J/K], of the winding."""
+    temperature_coefficient: float = 0.00393
+    """alpha [1/K] of the armature resistance; copper's."""
+    temperature_limit: float = 100.0
+    """Rise of the winding above the ambient [K] that it is rated for."""
 
     def __post_init__(self) -> None:
+        may_be_zero = {"gear_viscous_friction", "gear_coulomb_friction", "temperature_coefficient"}
         for field in fields(self):
-            check = non_negative if field.name == "gear_viscous_friction" else positive
+            check = non_negative if field.name in may_be_zero else positive
             _set(self, field.name, check(field.name, getattr(self, field.name)))
 
     @property
@@ -82,6 +93,11 @@ class MotorParameters:
     def reflected_viscous_friction(self) -> float:
         """D_m = d_m k^2 [N m s/rad at the joint].   Eq. 12."""
         return self.gear_viscous_friction * self.gear_ratio**2
+
+    @property
+    def reflected_coulomb_friction(self) -> float:
+        """T_c k [N m at the joint]."""
+        return self.gear_coulomb_friction * self.gear_ratio
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,7 +193,7 @@ class ArmParameters:
     def from_dict(cls, plain: Mapping[str, Any]) -> ArmParameters:
         """The arm of `to_dict`. Raises ValueError naming an unknown, missing or wrong entry."""
         allowed = {field.name for field in fields(cls)}
-        _only(plain, allowed, "arm")
+        check_entries(plain, allowed, "arm")
         missing = sorted(allowed - {"gravity"} - set(plain))
         if missing:
             raise ValueError(f"arm must have the entry {missing[0]!r}, got {sorted(plain)}")
@@ -197,7 +213,8 @@ def _sequence(name: str, value: object) -> Sequence[Any]:
     return cast("Sequence[Any]", value)
 
 
-def _only(plain: Mapping[str, Any], allowed: set[str], owner: str) -> None:
+def check_entries(plain: Mapping[str, Any], allowed: set[str], owner: str) -> None:
+    """ValueError naming `owner` and the first entry of `plain` that is not in `allowed`."""
     unknown = sorted(set(plain) - allowed)
     if unknown:
         raise ValueError(f"{owner} must have only the entries {sorted(allowed)}, got {unknown[0]!r}")
@@ -207,7 +224,7 @@ def _part(kind: type[Any], plain: object, owner: str) -> Any:
     if not isinstance(plain, Mapping):
         raise ValueError(f"{owner} must hold dicts of {kind.__name__}, got {plain!r}")
     mapping = cast("Mapping[str, Any]", plain)
-    _only(mapping, {field.name for field in fields(kind)}, owner)
+    check_entries(mapping, {field.name for field in fields(kind)}, owner)
     return kind(**mapping)
 
 

@@ -60,6 +60,33 @@ def test_constraint_jacobian_and_bias_are_derivatives_of_the_elbows_height(case)
     np.testing.assert_allclose(kinematics.constraint_bias(arm, q, q_dot, elbows), rate @ q_dot, rtol=1e-7, atol=1e-6)
 
 
+@given(cases())
+def test_radial_jacobian_is_the_derivative_of_the_radius_and_the_radius_is_the_distance_from_the_yaw_axis(case):
+    arm, q = case.arm, case.q
+    points = range(3, arm.n_joints + 2)
+    steps = NUDGE * np.eye(arm.n_joints)
+    slopes = [
+        (kinematics.radii(arm, q + step, points) - kinematics.radii(arm, q - step, points)) / (2.0 * NUDGE)
+        for step in steps
+    ]
+    np.testing.assert_allclose(kinematics.radial_jacobian(arm, q, points), np.transpose(slopes), atol=1e-8)
+    positions = kinematics.joint_positions(arm, q)[2:]
+    np.testing.assert_allclose(
+        np.abs(kinematics.radii(arm, q, points)), np.hypot(positions[:, 0], positions[:, 1]), atol=1e-12
+    )
+
+
+def test_the_hand_is_the_point_after_the_last_joint(arm):
+    q = np.random.default_rng(5).normal(size=10)
+    assert kinematics.elbow_heights(arm, q, [11]) == kinematics.hand_position(arm, q)[2]
+    steps = NUDGE * np.eye(10)
+    slopes = [
+        (kinematics.hand_position(arm, q + step) - kinematics.hand_position(arm, q - step))[2] / (2.0 * NUDGE)
+        for step in steps
+    ]
+    np.testing.assert_allclose(kinematics.constraint_jacobian(arm, q, [11])[0], slopes, atol=1e-8)
+
+
 @given(angles, between(-0.1, 0.02))
 def test_inverse_kinematics_puts_the_hand_on_the_target(arm, angle, height):
     target = circle(angle)[0] + [0.0, 0.0, height]

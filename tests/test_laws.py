@@ -9,14 +9,19 @@ from scipy.integrate import solve_ivp
 from elbow_gym import ArmParameters, LinkParameters, MotorParameters, Simulator, dynamics, kinematics, paper_arm
 
 ELBOWS = [0, 1, 2, (3, 5), (4, 7, 9)]
+BEYOND_THE_PAPER = {
+    "gear_coulomb_friction", "thermal_resistance", "heat_capacity", "temperature_coefficient", "temperature_limit",
+}  # fmt: skip
 
 
 def uneven_arm():
-    """The paper's arm with every constant of every joint scaled by its own factor."""
+    """The paper's arm with every one of its constants scaled by its own factor at every joint."""
     rng = np.random.default_rng(7)
 
     def scattered(part):
-        return {name: value * rng.uniform(0.7, 1.4) for name, value in vars(part).items()}
+        return {
+            name: value * rng.uniform(0.7, 1.4) for name, value in vars(part).items() if name not in BEYOND_THE_PAPER
+        }
 
     arm = paper_arm()
     return ArmParameters(

@@ -1,0 +1,54 @@
+"""The compliant table under the arm: what it is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any, cast
+
+from elbow_gym.parameters import check_entries, non_negative, positive
+
+FRICTION_VELOCITY = 0.01
+"""Sliding speed [m/s] over which friction on the table comes up, unless a table says otherwise."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableParameters:
+    """A table at z = 0 that pushes and never pulls: Hunt-Crossley normal force, smooth Coulomb friction.
+
+    Raises ValueError naming the field unless stiffness and friction_velocity are positive, the others not negative.
+    """
+
+    stiffness: float = 1e5
+    """k [N/m], at each touching point."""
+    dissipation: float = 0.5
+    """c [s/m]: the normal force grows by this share per m/s of approach."""
+    friction: float = 0.0
+    """mu [-], Coulomb's coefficient."""
+    friction_velocity: float = FRICTION_VELOCITY
+    """v_s [m/s]: friction has 0.71 of its full size at this sliding speed."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            check = positive if field.name in {"stiffness", "friction_velocity"} else non_negative
+            object.__setattr__(self, field.name, check(f"table {field.name}", getattr(self, field.name)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON types, which `as_table` takes back."""
+        return asdict(self)
+
+
+def as_table(table: object) -> TableParameters | None:
+    """A table from True (the default one), a dict of its fields or a TableParameters; None from False.
+
+    Raises ValueError on anything else.
+    """
+    if isinstance(table, bool):
+        return TableParameters() if table else None
+    if isinstance(table, TableParameters):
+        return table
+    if isinstance(table, Mapping):
+        plain = cast("Mapping[str, Any]", table)
+        check_entries(plain, {field.name for field in fields(TableParameters)}, "table")
+        return TableParameters(**plain)
+    raise ValueError(f"table must be True, False, a dict of its fields or TableParameters, got {table!r}")
