@@ -13,7 +13,7 @@ This is the only file with compiled code: Numba's cache does not notice edits in
 """
 
 # pyright: basic
-# ruff: noqa: E741, ANN001, ANN201, ANN202
+# ruff: noqa: E741, ANN001, ANN201, ANN202, PLR0912, PLR0915
 
 import sys
 from collections.abc import Callable
@@ -28,6 +28,12 @@ from numba import njit
 # Rows of a block's public arrays: state (B, STATE_ROWS, n) and parameters (B, PARAMETER_ROWS, n).
 STATE = ("q", "q_dot", "current", "electrical_energy", "drawn_energy", "copper_loss", "friction_loss", "link_work")
 STATE_ROWS = len(STATE)
+# Behind them, in arrays for a kernel with a switch on: per joint or, for contacts, per contact point at the link's end;
+# the supply's loss stands with joint 1.
+SWITCHED_STATE = (
+    "contact_loss", "temperature_rise", "supply_loss", "contact_radial", "contact_tangential", "contact_normal",
+)  # fmt: skip
+SWITCHED_STATE_ROWS = STATE_ROWS + len(SWITCHED_STATE)
 PARAMETERS = (
     "length",
     "mass",
@@ -42,7 +48,20 @@ PARAMETERS = (
     "inverse_inductance",  # 1 / L
     "gravity",  # g, the same in every entry
     "payload",  # mass at the hand, the same in every entry
+    # From here on only kernels with a switch on look.
+    "stiffness",  # k of the table
+    "dissipation",  # c
+    "table_friction",  # mu
+    "friction_velocity",  # v_s
+    "elbow_friction",  # mu_e of the rigid elbows
+    "reflected_coulomb_friction",  # T_c k
+    "heating",  # 1 / C_th
+    "cooling",  # 1 / (R_th C_th)
+    "temperature_coefficient",  # alpha, or 0 while windings are not followed
+    "sag",  # R_s / V0^2
+    "bus_floor",  # least V0 I that the supply takes: 0, or far below without bound
 )
+PLAIN_PARAMETER_ROWS = 13
 PARAMETER_ROWS = len(PARAMETERS)
 # Columns of the per-arm summary (B, SUMMARY_COLUMNS + p): hand position, lowest joint or hand height, seconds spent
 # below the table (accumulated), 1 while the state is representable, then one force per elbow.
@@ -63,12 +82,19 @@ FIGURES = (
 LARGEST_ANGLE = 1e5
 # Elbows rest at z = 0 to 1e-8 m; lower than this is under the table.
 BELOW_TABLE_TOLERANCE = 1e-6
+# A compliant table gives way: what touches it is under it from here on.
+CONTACT_TOLERANCE = 1e-3
+# Speeds over which friction of rigid elbows [m/s] and of gears [rad/s] comes up.
+ELBOW_SPEED = 0.01
+GEAR_SPEED = 0.05
 MAXIMUM_ELBOWS = 8
 # A projection onto the table is repeated while it turns a link by more than this [rad per m of it], so often at most.
 SMALL_SHIFT = 1e-7
 NEWTON_STEPS = 30
-# Slots of a record, named below; one per possible elbow follows them.
+# Slots of a record, named below: those of every kernel, those of kernels with a switch on; then one per possible elbow,
+# two where elbows rub.
 SLOTS = 52
+SWITCHED_SLOTS = 26
 
 _ROUND = 6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds to the nearest integer
 _TWO_OVER_PI = 0.6366197723675814
@@ -92,30 +118,55 @@ LANES = U(W)
     PHI, OMEGA, SPIN, RHO, RHOD, SUMR, SUMZ, Z, YAW, YAWD, LOW, ER, EZ, FR, FZ, T, D,
     KRR, KRZ, KZZ, BR, BZ, B3, FREE, GAIN,
 ) = (U(W * row) for row in range(SLOTS))  # fmt: skip
+(
+    CONTACT_LOSS, TEMPERATURE, SUPPLY_LOSS, CONTACT_R, CONTACT_T, CONTACT_N,
+    STIFFNESS, DISSIPATION, TABLE_FRICTION, FRICTION_SPEED, ELBOW_FRICTION, COULOMB, HEATING, COOLING, WARMING, SAG,
+    BUS_FLOOR,
+    PSID, ZD, TWIST, LOSS, GEAR, BUS, SHARE, TEMPERATURE0, TEMPERATUREA,
+) = (U(W * (SLOTS + row)) for row in range(SWITCHED_SLOTS))  # fmt: skip
 # Slots that one pass is done with serve the next: `inward` turns FR, FZ, T into I_f3 and r.
 IR3, IZ3, R = FR, FZ, T
 AR, AZ, ALPHA = CR, CZ, C3 = KRR, KRZ, KZZ
 HEIGHT, RATE, GRAM = B3, BR, BZ
+# What a kernel knows, decided when it is made: a compliant table, friction on rigid elbows, motors beyond the paper's.
+TABLE, RUBBING, DRIVE = False, False, False
+LOWEST_FREE = BELOW_TABLE_TOLERANCE
 Y = W * SLOTS
+X = Y + W * MAXIMUM_ELBOWS
 # One row more, so that a slot of neighbouring records does not fall on the same cache lines.
 STRIDE = W * (SLOTS + MAXIMUM_ELBOWS + 1)
 NEXT = U(STRIDE)
-# Rows of a block: the Delassus matrix and the elbow forces, time below the table, the projection's shift and mask.
-FORCES = U(W * MAXIMUM_ELBOWS * MAXIMUM_ELBOWS)
-BELOW = U(W * (MAXIMUM_ELBOWS + 1) * MAXIMUM_ELBOWS)
+# Rows of a block: the Delassus matrix and the elbow forces, time below the table, the projection's shift and mask; then
+# what friction on elbows needs: the matrix again, what friction adds to it, the free accelerations, friction per newton
+# of each elbow's force, radial and tangential, which elbows push, and how hard.
+_MATRIX = MAXIMUM_ELBOWS * MAXIMUM_ELBOWS
+FORCES = U(W * _MATRIX)
+BELOW = U(W * (_MATRIX + MAXIMUM_ELBOWS))
 SHIFT = BELOW + U(W)
 ACTIVE = SHIFT + U(W)
-TAIL = W * ((MAXIMUM_ELBOWS + 1) * MAXIMUM_ELBOWS + 3)
+PLAIN_TAIL = W * (_MATRIX + MAXIMUM_ELBOWS + 3)
+MATRIX = U(PLAIN_TAIL)
+COUPLING = MATRIX + U(W * _MATRIX)
+FREE_RISE = COUPLING + U(W * _MATRIX)
+SLIDE_R = FREE_RISE + U(W * MAXIMUM_ELBOWS)
+SLIDE_T = SLIDE_R + U(W * MAXIMUM_ELBOWS)
+PUSHING = SLIDE_T + U(W * MAXIMUM_ELBOWS)
+PUSH = PUSHING + U(W * MAXIMUM_ELBOWS)
+TAIL = W * (3 * _MATRIX + 6 * MAXIMUM_ELBOWS + 3)
 # Everything above that is measured in lanes, and the templates that are inlined into their callers.
 SCALED = (
-    "W", "LANES", "Y", "STRIDE", "NEXT", "FORCES", "BELOW", "SHIFT", "ACTIVE", "TAIL",
+    "W", "LANES", "FORCES", "BELOW", "SHIFT", "ACTIVE", "TAIL",
+    "MATRIX", "COUPLING", "FREE_RISE", "SLIDE_R", "SLIDE_T", "PUSHING", "PUSH",
     "Q", "QD", "I", "Q0", "QD0", "I0", "QDA", "IA", "ELECTRICAL", "DRAWN", "COPPER", "FRICTION", "WORK", "V",
     "LENGTH", "MASS", "END_INERTIA", "DIFFERENCE", "AXIAL", "ROTOR", "KM", "DAMPING", "MOTOR_DAMPING", "RESISTANCE",
     "INVERSE_L", "GRAVITY", "PAYLOAD", "PHI", "OMEGA", "SPIN", "RHO", "RHOD", "SUMR", "SUMZ", "Z", "YAW", "YAWD", "LOW",
     "ER", "EZ", "FR", "FZ", "T", "D", "KRR", "KRZ", "KZZ", "BR", "BZ", "B3", "FREE", "GAIN",
     "IR3", "IZ3", "R", "AR", "AZ", "ALPHA", "CR", "CZ", "C3", "HEIGHT", "RATE", "GRAM",
+    "CONTACT_LOSS", "TEMPERATURE", "SUPPLY_LOSS", "CONTACT_R", "CONTACT_T", "CONTACT_N", "STIFFNESS", "DISSIPATION",
+    "TABLE_FRICTION", "FRICTION_SPEED", "ELBOW_FRICTION", "COULOMB", "HEATING", "COOLING", "WARMING", "SAG",
+    "BUS_FLOOR", "PSID", "ZD", "TWIST", "LOSS", "GEAR", "BUS", "SHARE", "TEMPERATURE0", "TEMPERATUREA",
 )  # fmt: skip
-INLINED = ("sincos", "joint", "stage")
+INLINED = ("sincos", "contact", "gear", "joint", "stage")
 
 
 def sincos(x):
@@ -313,8 +364,38 @@ def newton(ws, tail, elbows):
         tail[ACTIVE + k] = 1.0 if tail[SHIFT + k] > SMALL_SHIFT else 0.0
 
 
+def contact(ws, o, k, rho, rhod, z, zd):
+    """The compliant table's force on the end of a link, the torque about the yaw so far, and the power lost."""
+    psid = ws[o - NEXT + PSID + k]
+    slide = rho * psid
+    speed = ws[o + FRICTION_SPEED + k]
+    spring = ws[o + STIFFNESS + k] * max(-z, 0.0)
+    normal = max(spring * (1.0 - ws[o + DISSIPATION + k] * zd), 0.0)
+    drag = -ws[o + TABLE_FRICTION + k] * normal / np.sqrt(rhod * rhod + slide * slide + speed * speed)
+    radial = drag * rhod
+    tangential = drag * slide
+    ws[o + PSID + k] = psid
+    ws[o + ZD + k] = zd
+    ws[o + CONTACT_R + k] = radial
+    ws[o + CONTACT_T + k] = tangential
+    ws[o + CONTACT_N + k] = normal
+    ws[o + TWIST + k] = ws[o - NEXT + TWIST + k] + rho * tangential
+    ws[o + LOSS + k] = (spring - normal) * zd - (radial * rhod + tangential * slide)
+
+
+def gear(ws, o, k):
+    """Torque of the gear's Coulomb friction along the joint's motion."""
+    q_dot = ws[o + QD + k]
+    torque = ws[o + COULOMB + k] * q_dot / np.sqrt(q_dot * q_dot + GEAR_SPEED * GEAR_SPEED)
+    ws[o + GEAR + k] = torque
+    return torque
+
+
 def outward(ws, n):
     """Positions, velocity products, yaw inertia and each link's inertial and gravity force, base to tip."""
+    if DRIVE:
+        for k in range(LANES):
+            ws[BUS + k] = ws[V + k] * ws[I + k]
     for a in range(1, n):
         o = U(a * STRIDE)
         for k in range(LANES):
@@ -352,6 +433,10 @@ def outward(ws, n):
             ws[o + FR + k] = fr
             ws[o + FZ + k] = fz
             ws[o + T + k] = hc * fr - hs * fz - dsc * spin
+            if TABLE:
+                contact(ws, o, k, rho + hs, rhod + hc * w, z, ws[o - NEXT + ZD + k] - 2.0 * hs * w)
+            if DRIVE:
+                ws[o + BUS + k] = ws[o - NEXT + BUS + k] + ws[o + V + k] * ws[o + I + k]
 
 
 def inward(ws, n):
@@ -385,12 +470,17 @@ def inward(ws, n):
             k33 = ws[o + NEXT + ROTOR + k] - ws[o + NEXT + ROTOR + k] * jd
             br = ws[o + NEXT + BR + k]
             bz = ws[o + NEXT + BZ + k]
+            if TABLE:
+                br -= ws[o + CONTACT_R + k]
+                bz -= ws[o + CONTACT_N + k]
             gr = krr * er + krz * ez + kr3
             gz = krz * er + kzz * ez + kz3
             ir3 = 0.5 * m * er + gr
             iz3 = 0.5 * m * ez + gz
             i33 = (ws[o + END_INERTIA + k] + k33) + (er * (gr + kr3) + ez * (gz + kz3))
             u = ws[o + KM + k] * ws[o + I + k] - ws[o + DAMPING + k] * ws[o + QD + k]
+            if DRIVE:
+                u -= gear(ws, o, k)
             r = (u - ws[o + T + k] - ws[o + NEXT + B3 + k]) - (er * br + ez * bz)
             d = 1.0 / (i33 + j)
             dr = d * r
@@ -442,7 +532,144 @@ def solve(tail, lanes, p):
             tail[force + k] *= -tail[diagonal + k]
 
 
-def brace(ws, tail, elbows):
+def rub(ws, tail, n, elbows):
+    """Friction of the elbows that push, and elbow forces that agree with it; `solve` finds the forces without it.
+
+    Friction enters the columns of the active elbows, at first those that push without friction, then those that push
+    with it, until they stay the same; the friction found is then held, so that it opposes the sliding in any case.
+    """
+    lanes = min(LANES, U(ws.size))
+    p = elbows.size
+    tip = U((n - 1) * STRIDE)
+    if not TABLE:
+        for k in range(lanes):
+            ws[tip + TWIST + k] = 0.0
+    couple(ws, tail, lanes, elbows)
+    solve(tail, lanes, p)
+    for _ in range(p + 2):
+        for j in range(p):
+            for k in range(lanes):
+                tail[PUSHING + U(j * W) + k] = 1.0 if tail[FORCES + U(j * W) + k] > 0.0 else 0.0
+        eliminate(tail, lanes, p)
+        changed = 0.0
+        for j in range(p):
+            for k in range(lanes):
+                pushes = 1.0 if tail[FORCES + U(j * W) + k] > 0.0 else 0.0
+                changed = max(changed, abs(pushes - tail[PUSHING + U(j * W) + k]))
+        if changed == 0.0:
+            break
+    hold(ws, tail, lanes, tip, elbows)
+
+
+def couple(ws, tail, lanes, elbows):
+    """Keeps the matrix and the free accelerations, and finds what friction adds: the rise at i for a newton on j."""
+    p = elbows.size
+    for j in range(p):
+        slide(ws, tail, lanes, elbows[j], j)
+    for j in range(p):
+        for k in range(lanes):
+            tail[FREE_RISE + U(j * W) + k] = tail[FORCES + U(j * W) + k]
+        for i in range(p):
+            entry = U((i * MAXIMUM_ELBOWS + j) * W)
+            symmetric = U((max(i, j) * MAXIMUM_ELBOWS + min(i, j)) * W)
+            for k in range(lanes):
+                tail[MATRIX + entry + k] = tail[symmetric + k]
+                tail[COUPLING + entry + k] = 0.0
+            for a in range(1, min(elbows[i], elbows[j]) - 1):
+                o = U(a * STRIDE)
+                for k in range(lanes):
+                    tail[COUPLING + entry + k] += ws[o + D + k] * ws[o + U(Y + i * W) + k] * ws[o + U(X + j * W) + k]
+
+
+def hold(ws, tail, lanes, tip, elbows):
+    """Puts the friction that was found on the arm and its loss on the meter; what is left to solve is the forces."""
+    p = elbows.size
+    for j in range(p):
+        for k in range(lanes):
+            tail[PUSH + U(j * W) + k] = max(tail[FORCES + U(j * W) + k], 0.0)
+    for i in range(p):
+        for k in range(lanes):
+            tail[FORCES + U(i * W) + k] = tail[FREE_RISE + U(i * W) + k]
+        for j in range(p):
+            entry = U((i * MAXIMUM_ELBOWS + j) * W)
+            for k in range(lanes):
+                tail[entry + k] = tail[MATRIX + entry + k]
+                tail[FORCES + U(i * W) + k] += tail[COUPLING + entry + k] * tail[PUSH + U(j * W) + k]
+    for j in range(p):
+        x_slot = U(X + j * W)
+        push = PUSH + U(j * W)
+        for a in range(1, elbows[j] - 1):
+            o = U(a * STRIDE)
+            for k in range(lanes):
+                ws[o + R + k] += ws[o + x_slot + k] * tail[push + k]
+        o = U((elbows[j] - 2) * STRIDE)
+        for k in range(lanes):
+            radial = tail[SLIDE_R + U(j * W) + k] * tail[push + k]
+            tangential = tail[SLIDE_T + U(j * W) + k] * tail[push + k]
+            lost = -(radial * ws[o + RHOD + k] + tangential * ws[o + RHO + k] * ws[QD + k])
+            ws[o + LOSS + k] = ws[o + LOSS + k] + lost if TABLE else lost
+            ws[tip + TWIST + k] += tangential * ws[o + RHO + k]
+
+
+def slide(ws, tail, lanes, elbow, j):
+    """Friction per newton of an elbow's force, and x, the recursion's answer to its radial part."""
+    o = U((elbow - 2) * STRIDE)
+    for k in range(lanes):
+        radial = ws[o + RHOD + k]
+        tangential = ws[o + RHO + k] * ws[QD + k]
+        speed = np.sqrt(radial * radial + tangential * tangential + ELBOW_SPEED * ELBOW_SPEED)
+        share = -ws[o + ELBOW_FRICTION + k] / speed
+        tail[SLIDE_R + U(j * W) + k] = share * radial
+        tail[SLIDE_T + U(j * W) + k] = share * tangential
+        ws[o + NEXT + CR + k] = -share * radial
+        ws[o + NEXT + CZ + k] = 0.0
+        ws[o + NEXT + C3 + k] = 0.0
+    for a in range(elbow - 2, 0, -1):
+        o = U(a * STRIDE)
+        for k in range(LANES):
+            cr = ws[o + NEXT + CR + k]
+            cz = ws[o + NEXT + CZ + k]
+            x = -((ws[o + ER + k] * cr + ws[o + EZ + k] * cz) + ws[o + NEXT + C3 + k])
+            dx = ws[o + D + k] * x
+            ws[o + CR + k] = cr + dx * ws[o + IR3 + k]
+            ws[o + CZ + k] = cz + dx * ws[o + IZ3 + k]
+            ws[o + C3 + k] = -ws[o + ROTOR + k] * dx
+            ws[o + U(X + j * W) + k] = x
+
+
+def eliminate(tail, lanes, p):
+    """Elbow forces with the friction of those that push: Gauss on the matrix and what friction adds to it."""
+    for i in range(p):
+        for k in range(lanes):
+            tail[FORCES + U(i * W) + k] = -tail[FREE_RISE + U(i * W) + k]
+        for j in range(p):
+            entry = U((i * MAXIMUM_ELBOWS + j) * W)
+            for k in range(lanes):
+                rubbing = tail[PUSHING + U(j * W) + k] * tail[COUPLING + entry + k]
+                tail[entry + k] = tail[MATRIX + entry + k] + rubbing
+    for j in range(p):
+        pivot = U((j * MAXIMUM_ELBOWS + j) * W)
+        for i in range(j + 1, p):
+            lead = U((i * MAXIMUM_ELBOWS + j) * W)
+            for k in range(lanes):
+                tail[lead + k] /= tail[pivot + k]
+                tail[FORCES + U(i * W) + k] -= tail[lead + k] * tail[FORCES + U(j * W) + k]
+            for m in range(j + 1, p):
+                entry = U((i * MAXIMUM_ELBOWS + m) * W)
+                above = U((j * MAXIMUM_ELBOWS + m) * W)
+                for k in range(lanes):
+                    tail[entry + k] -= tail[lead + k] * tail[above + k]
+    for j in range(p - 1, -1, -1):
+        force = FORCES + U(j * W)
+        for m in range(j + 1, p):
+            entry = U((j * MAXIMUM_ELBOWS + m) * W)
+            for k in range(lanes):
+                tail[force + k] -= tail[entry + k] * tail[FORCES + U(m * W) + k]
+        for k in range(lanes):
+            tail[force + k] /= tail[U((j * MAXIMUM_ELBOWS + j) * W) + k]
+
+
+def brace(ws, tail, n, elbows):
     """Elbow forces: f = -W^-1 z_ddot_free, with W = sum of d y y^T and z_ddot_free = sum of d y r + J_dot q_dot.
 
     y is the recursion's answer to a unit +z force at an elbow; the forces then add sum of y f to r.
@@ -485,6 +712,8 @@ def brace(ws, tail, elbows):
                 o = U(a * STRIDE)
                 for k in range(lanes):
                     tail[entry + k] += ws[o + D + k] * ws[o + y_slot + k] * ws[o + other + k]
+    if RUBBING:
+        rub(ws, tail, n, elbows)
     solve(tail, lanes, elbows.size)
     for j in range(elbows.size):
         y_slot = U(Y + j * W)
@@ -499,7 +728,7 @@ def evaluate(ws, tail, n, elbows):
     """All that the joint accelerations are made of, at the current stage's state."""
     outward(ws, n)
     inward(ws, n)
-    brace(ws, tail, elbows)
+    brace(ws, tail, n, elbows)
 
 
 def joint(ws, o, k, q_ddot, weight, ahead, first, last):
@@ -514,6 +743,19 @@ def joint(ws, o, k, q_ddot, weight, ahead, first, last):
     i0 = i if first else ws[o + I0 + k]
     v = ws[o + V + k]
     resistance = ws[o + RESISTANCE + k]
+    if DRIVE:
+        v *= ws[o + SHARE + k]
+        warmth = ws[o + TEMPERATURE + k]
+        resistance *= 1.0 + ws[o + WARMING + k] * warmth
+        warmth0 = warmth if first else ws[o + TEMPERATURE0 + k]
+        warmer = weight * (ws[o + HEATING + k] * (resistance * i * i) - ws[o + COOLING + k] * warmth)
+        heat = ahead * (ws[o + HEATING + k] * (resistance * i * i) - ws[o + COOLING + k] * warmth)
+        if first:
+            ws[o + TEMPERATURE0 + k] = warmth0
+        else:
+            warmer += ws[o + TEMPERATUREA + k]
+        ws[o + TEMPERATUREA + k] = warmer
+        ws[o + TEMPERATURE + k] = warmth0 + (warmer if last else heat)
     km = ws[o + KM + k]
     i_dot = (v - resistance * i - km * q_dot) * ws[o + INVERSE_L + k]
     power = v * i
@@ -521,7 +763,13 @@ def joint(ws, o, k, q_ddot, weight, ahead, first, last):
     ws[o + ELECTRICAL + k] += weight * power
     ws[o + DRAWN + k] += weight * max(power, 0.0)
     ws[o + COPPER + k] += weight * (resistance * i * i)
-    ws[o + FRICTION + k] += weight * (ws[o + DAMPING + k] * q_dot * q_dot)
+    friction = ws[o + DAMPING + k] * q_dot * q_dot
+    if DRIVE:
+        torque -= ws[o + GEAR + k]
+        friction += ws[o + GEAR + k] * q_dot
+    if TABLE or RUBBING:
+        ws[o + CONTACT_LOSS + k] += weight * ws[o + LOSS + k]
+    ws[o + FRICTION + k] += weight * friction
     ws[o + WORK + k] += weight * (torque * q_dot)
     qda = weight * q_ddot
     ia = weight * i_dot
@@ -557,11 +805,22 @@ def stage(ws, n, weight, ahead, first, last):
         inertia = ws[end + YAW + k] + load * rho * rho + ws[ROTOR + k]
         rate = ws[end + YAWD + k] + 2.0 * load * rho * ws[end + RHOD + k]
         u = ws[KM + k] * ws[I + k] - ws[DAMPING + k] * ws[QD + k]
+        if TABLE or RUBBING:
+            u += ws[end + TWIST + k]
+        if DRIVE:
+            u -= gear(ws, U(0), k)
+            drawn = max(ws[end + BUS + k], ws[BUS_FLOOR + k])
+            ws[SHARE + k] = 1.0 - ws[SAG + k] * drawn
+            ws[SUPPLY_LOSS + k] += weight * (ws[SAG + k] * drawn * drawn)
         joint(ws, U(0), k, (u - rate * ws[QD + k]) / inertia, weight, ahead, first, last)
         ws[SPIN + k] = ws[QD + k] * ws[QD + k]
+        if TABLE:
+            ws[PSID + k] = ws[QD + k]
     for a in range(1, n):
         o = U(a * STRIDE)
         for k in range(LANES):
+            if DRIVE:
+                ws[o + SHARE + k] = ws[o - NEXT + SHARE + k]
             ar = ws[o - NEXT + AR + k]
             az = ws[o - NEXT + AZ + k]
             before = ws[o - NEXT + ALPHA + k]
@@ -607,10 +866,17 @@ def load(ws, n, start, state, parameters, voltage):
             for row in range(5):
                 ws[o + ELECTRICAL + U(row * W)] = state[arm, 3 + row, a]
             ws[o + V] = voltage[arm, a]
-            for row in range(PARAMETER_ROWS):
+            for row in range(PLAIN_PARAMETER_ROWS):
                 ws[o + LENGTH + U(row * W)] = parameters[arm, row, a]
+            if TABLE or RUBBING or DRIVE:
+                for row in range(3):
+                    ws[o + CONTACT_LOSS + U(row * W)] = state[arm, STATE_ROWS + row, a]
+                for row in range(PARAMETER_ROWS - PLAIN_PARAMETER_ROWS):
+                    ws[o + STIFFNESS + U(row * W)] = parameters[arm, PLAIN_PARAMETER_ROWS + row, a]
         k = U(lane)
         ws[SPIN + k] = ws[QD + k] * ws[QD + k]
+        if TABLE:
+            ws[PSID + k] = ws[QD + k]
         ws[YAW + k] = ws[AXIAL + k]
         ws[LOW + k] = np.inf
 
@@ -623,6 +889,8 @@ def unload(ws, tail, n, lane, elbows, out, summary):
         o = U(a * STRIDE + lane)
         # Not-a-number and infinity fail the comparison or turn the product into not-a-number.
         meters = ws[o + ELECTRICAL] + ws[o + COPPER] + ws[o + FRICTION] + ws[o + WORK]
+        if TABLE or RUBBING or DRIVE:
+            meters += ws[o + CONTACT_LOSS] + ws[o + TEMPERATURE] + ws[o + SUPPLY_LOSS]
         valid = valid and abs(ws[o + Q]) + 0.0 * (ws[o + QD] + ws[o + I] + meters) < LARGEST_ANGLE
     summary[VALID] = 1.0 if valid else 0.0
     if not valid:
@@ -633,6 +901,9 @@ def unload(ws, tail, n, lane, elbows, out, summary):
             out[row, a] = ws[o + U(row * W)]
         for row in range(5):
             out[3 + row, a] = ws[o + ELECTRICAL + U(row * W)]
+        if TABLE or RUBBING or DRIVE:
+            for row in range(SWITCHED_STATE_ROWS - STATE_ROWS):
+                out[STATE_ROWS + row, a] = ws[o + CONTACT_LOSS + U(row * W)]
     end = U((n - 1) * STRIDE) + k
     s, c = sincos(ws[Q + k])
     summary[HAND] = ws[end + RHO] * c
@@ -663,7 +934,7 @@ def advance(state, parameters, voltage, elbows, first, end, n_steps, step, summa
         evaluate(ws, tail, n, elbows)
         for _ in range(n_steps):
             for k in range(LANES):
-                tail[BELOW + k] += step if ws[tip + LOW + k] < -BELOW_TABLE_TOLERANCE else 0.0
+                tail[BELOW + k] += step if ws[tip + LOW + k] < -LOWEST_FREE else 0.0
             first_stage(ws, n, step / 6.0, step / 2.0)
             evaluate(ws, tail, n, elbows)
             middle_stage(ws, n, step / 3.0, step / 2.0)
@@ -722,34 +993,46 @@ class Kernel(NamedTuple):
 
 
 @cache
-def kernel(lanes: int) -> Kernel:
+def kernel(lanes: int, *, table: bool = False, rubbing: bool = False, drive: bool = False) -> Kernel:
     """The entries for blocks of `lanes` arms (a divisor of W), compiled or taken from the cache.
 
-    The functions above are templates: each lane count gets its own copy, whose globals are its own row offsets and its
-    own compiled callees. Closures would do the same, but Numba's disk cache never recognises a closure over compiled
-    functions. Only the entries are cached; what they call is compiled into them.
+    `table` is for a compliant table, `rubbing` for friction on rigid elbows, `drive` for gear friction, warm windings
+    and a supply that sags. What is off is not compiled; with any on, state arrays have SWITCHED_STATE_ROWS.
+
+    The functions above are templates: each kernel gets its own copy, whose globals are its own row offsets and switches
+    and its own compiled callees. Closures would do the same, but Numba's disk cache never recognises a closure over
+    compiled functions. Only the entries are cached; what they call is compiled into them.
     """
     space = dict(globals())
     space.update({name: type(space[name])(int(space[name]) * lanes // W) for name in SCALED})
+    switched = table or rubbing or drive
+    answers = lanes * (SLOTS + (SWITCHED_SLOTS if switched else 0))
+    stride = answers + lanes * (MAXIMUM_ELBOWS * (2 if rubbing else 1) + 1)
+    space.update(TABLE=table, RUBBING=rubbing, DRIVE=drive, LOWEST_FREE=CONTACT_TOLERANCE if table else LOWEST_FREE)
+    space.update(Y=answers, X=answers + lanes * MAXIMUM_ELBOWS, STRIDE=stride, NEXT=U(stride))
+    if not rubbing:
+        space["TAIL"] = PLAIN_TAIL * lanes // W
     templates = (
-        sincos, newton, project, outward, inward, solve, brace, evaluate, joint, stage, first_stage, middle_stage,
-        last_stage, workspace, load, unload, advance, accelerations, settle,
+        sincos, newton, project, contact, gear, outward, inward, solve, slide, couple, eliminate, hold, rub, brace,
+        evaluate, joint, stage, first_stage, middle_stage, last_stage, workspace, load, unload, advance, accelerations,
+        settle,
     )  # fmt: skip
+    letters = "".join(letter for letter, on in zip("trd", (table, rubbing, drive), strict=True) if on)
     for template in templates:
         name = template.__name__
-        copy = FunctionType(template.__code__, space, f"{name}_{lanes}")
+        copy = FunctionType(template.__code__, space, f"{name}_{lanes}{letters}")
         copy.__qualname__ = copy.__name__
         space[name] = _compiled(copy, cached=name in Kernel._fields, inlined=name in INLINED)
     made = Kernel(*(space[name] for name in Kernel._fields))
-    _compile_now(made)
+    _compile_now(made, SWITCHED_STATE_ROWS if switched else STATE_ROWS)
     return made
 
 
-def _compile_now(made):
+def _compile_now(made, rows):
     """Calls the entries that every run needs once, on an arm of nothing; says so when that takes a while."""
     elbows, one = np.array([3]), np.ones((1, 3))
     parameters = np.ones((1, PARAMETER_ROWS, 3))
-    state, summary = np.ones((1, STATE_ROWS, 3)), np.zeros((1, SUMMARY_COLUMNS + 1))
+    state, summary = np.ones((1, rows, 3)), np.zeros((1, SUMMARY_COLUMNS + 1))
     message = "elbow_gym: compiling its kernel for this machine, once; later starts take it from the cache"
     notice = Timer(PATIENCE, print, (message,), {"file": sys.stderr, "flush": True})
     notice.daemon = True

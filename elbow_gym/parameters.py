@@ -100,6 +100,16 @@ class MotorParameters:
         return self.gear_coulomb_friction * self.gear_ratio
 
 
+def cylinder_axial_inertia(mass: Any, radius: Any) -> Any:
+    """I_s = m r^2 / 2 [kg m^2], about a solid cylinder's axis; numbers or arrays."""
+    return mass * radius**2 / 2.0
+
+
+def cylinder_transverse_inertia(mass: Any, radius: Any, length: Any) -> Any:
+    """I_t = m (3 r^2 + l^2) / 12 [kg m^2], across the axis at the centre of mass; numbers or arrays."""
+    return mass * (3.0 * radius**2 + length**2) / 12.0
+
+
 @dataclass(frozen=True, kw_only=True)
 class LinkParameters:
     """A uniform solid cylinder, its centre of mass in the middle."""
@@ -118,13 +128,13 @@ class LinkParameters:
 
     @property
     def axial_inertia(self) -> float:
-        """I_s = m r^2 / 2 [kg m^2], about the cylinder's axis."""
-        return self.mass * self.radius**2 / 2.0
+        """I_s [kg m^2], about the cylinder's axis."""
+        return cylinder_axial_inertia(self.mass, self.radius)
 
     @property
     def transverse_inertia(self) -> float:
-        """I_t = m (3 r^2 + l^2) / 12 [kg m^2], across the axis at the centre of mass."""
-        return self.mass * (3.0 * self.radius**2 + self.length**2) / 12.0
+        """I_t [kg m^2], across the axis at the centre of mass."""
+        return cylinder_transverse_inertia(self.mass, self.radius, self.length)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,6 +6,7 @@ from strategies import between, cases
 from test_kernel import accelerations, states
 
 from elbow_gym import LinkParameters, dynamics
+from elbow_gym.conditions import Conditions
 from elbow_gym.tables import parameter_table
 
 # Where the linear systems are worse conditioned than this, rounding alone exceeds the tolerance.
@@ -19,7 +20,8 @@ def assert_close(value, expected, relative):
 def fast(case, payload=0.0):
     """The kernel's accelerations, elbow forces and current rates of one arm."""
     state = states(case.q[None], case.q_dot[None], case.current[None])
-    found = accelerations(1, state, parameter_table(case.arm, payload)[None], case.voltage[None], case.elbows)
+    table = parameter_table(case.arm, Conditions(payload=payload))[None]
+    found = accelerations(1, state, table, case.voltage[None], case.elbows)
     return [value[0] for value in found]
 
 

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from elbow_gym import kernel, kinematics, paper_arm
+from elbow_gym.conditions import Conditions
 from elbow_gym.tables import parameter_table
 
 HERE = Path(__file__).parent
@@ -26,11 +27,11 @@ def states(q, q_dot, current):
     return state
 
 
-def accelerations(lanes, state, parameters, voltage, elbows):
+def accelerations(lanes, state, parameters, voltage, elbows, **switches):
     """The kernel's q_ddot, elbow forces and current rates of a batch."""
     q_ddot, current_dot, force = np.zeros_like(voltage), np.zeros_like(voltage), np.zeros((len(voltage), len(elbows)))
     joints = np.array(elbows, dtype=np.int64)
-    kernel.kernel(lanes).accelerations(state, parameters, voltage, joints, q_ddot, current_dot, force)
+    kernel.kernel(lanes, **switches).accelerations(state, parameters, voltage, joints, q_ddot, current_dot, force)
     return q_ddot, force, current_dot
 
 
@@ -38,7 +39,7 @@ def batch(size):
     """Arms that differ in state, voltage and every parameter, near the start pose."""
     rng = np.random.default_rng(5)
     scatter = rng.uniform(0.7, 1.4, (40, kernel.PARAMETER_ROWS, 10))
-    parameters = parameter_table(paper_arm(), payload=0.2) * scatter
+    parameters = parameter_table(paper_arm(), Conditions(payload=0.2)) * scatter
     state = states(paper_arm().nominal_pose + 0.3 * rng.normal(size=(40, 10)), *rng.normal(size=(2, 40, 10)))
     return state[:size].copy(), parameters[:size].copy(), rng.uniform(-24.0, 24.0, (40, 10))[:size].copy()
 

@@ -1,0 +1,66 @@
+"""What an arm works under beyond the paper's model: load, table, friction, heat and supply. All off by default."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from elbow_gym.parameters import ArmParameters, non_negative, positive
+from elbow_gym.table import TableParameters, as_table
+
+# Contact on a table of the default stiffness wants RK4 steps no longer than this [s].
+TABLE_TIMESTEP = 0.001
+# Explicit RK4 is stable up to 2.785 / rate; fastest are the armature, at R / L, and a gear near standstill.
+STABILITY_LIMIT = 2.7
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conditions:
+    """Switches and loads. Raises ValueError naming the argument, the rule and the value."""
+
+    payload: float = 0.0
+    """Point mass at the hand [kg]."""
+    table: bool | TableParameters | dict[str, float] | None = None
+    """A compliant table under joints 3..n and the hand: True for the default one, or its fields."""
+    elbow_friction: float = 0.0
+    """Coulomb's coefficient of rigid elbows on the table, where they push [-]."""
+    heat: bool = False
+    """Whether windings warm up, and their resistance with them."""
+    supply_voltage: float = 24.0
+    """V0 of the common supply [V], from which `supply_resistance` takes."""
+    supply_resistance: float = 0.0
+    """R_s inside the supply [ohm]."""
+    regeneration: bool = True
+    """Whether the supply takes current back."""
+
+    def __post_init__(self) -> None:
+        for name in ("payload", "elbow_friction", "supply_resistance"):
+            object.__setattr__(self, name, non_negative(name, getattr(self, name)))
+        object.__setattr__(self, "supply_voltage", positive("supply_voltage", self.supply_voltage))
+        object.__setattr__(self, "table", None if self.table is None else as_table(self.table))
+        for name in ("heat", "regeneration"):
+            if not isinstance(getattr(self, name), bool):
+                raise ValueError(f"{name} must be True or False, got {getattr(self, name)!r}")
+
+    @property
+    def surface(self) -> TableParameters | None:
+        """The compliant table, if there is one."""
+        return self.table if isinstance(self.table, TableParameters) else None
+
+    def drive(self, arm: ArmParameters) -> bool:
+        """Whether motors or supply go beyond the paper's."""
+        rough = bool((arm.of_motors("gear_coulomb_friction") > 0.0).any())
+        return self.heat or self.supply_resistance > 0.0 or rough
+
+    def longest_timestep(self, arm: ArmParameters, gear_speed: float) -> tuple[float, str]:
+        """The longest stable RK4 step [s] and what sets it; `gear_speed` smooths the gears' friction [rad/s]."""
+        resistance, inductance = arm.of_motors("armature_resistance"), arm.of_motors("armature_inductance")
+        limits = {"L / R": STABILITY_LIMIT / float((resistance / inductance).max())}
+        gear = arm.of_motors("reflected_coulomb_friction") / arm.of_motors("reflected_inertia")
+        rate = float(gear.max()) / gear_speed
+        if rate > 0.0:
+            limits["gear_coulomb_friction"] = STABILITY_LIMIT / rate
+        if self.surface is not None:
+            softer = TableParameters().stiffness / self.surface.stiffness
+            limits["the table"] = TABLE_TIMESTEP * min(1.0, softer**0.5)
+        reason = min(limits, key=limits.__getitem__)
+        return limits[reason], reason
