@@ -17,7 +17,8 @@ MINIMUM_JOINTS = 3
 MAXIMUM_JOINTS = 64
 
 
-def _number(name: str, value: object) -> float:
+def finite(name: str, value: object) -> float:
+    """The value as a float; ValueError naming `name` unless it is a finite number."""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise ValueError(f"{name} must be a number, got {value!r}")
     number = float(value)
@@ -28,7 +29,7 @@ def _number(name: str, value: object) -> float:
 
 def positive(name: str, value: object) -> float:
     """The value as a float; ValueError naming `name` unless it is finite and above zero."""
-    number = _number(name, value)
+    number = finite(name, value)
     if number <= 0.0:
         raise ValueError(f"{name} must be positive, got {value!r}")
     return number
@@ -36,7 +37,7 @@ def positive(name: str, value: object) -> float:
 
 def non_negative(name: str, value: object) -> float:
     """The value as a float; ValueError naming `name` unless it is finite and at least zero."""
-    number = _number(name, value)
+    number = finite(name, value)
     if number < 0.0:
         raise ValueError(f"{name} must not be negative, got {value!r}")
     return number
@@ -175,7 +176,7 @@ class ArmParameters:
             non_negative(f"joint_viscous_friction[{k}]", value)
             for k, value in enumerate(self.joint_viscous_friction, start=1)
         )
-        pose = tuple(_number(f"nominal_pose[{k}]", value) for k, value in enumerate(self.nominal_pose, start=1))
+        pose = tuple(finite(f"nominal_pose[{k}]", value) for k, value in enumerate(self.nominal_pose, start=1))
         _set(self, "joint_viscous_friction", friction)
         _set(self, "nominal_pose", pose)
         _set(self, "gravity", non_negative("gravity", self.gravity))

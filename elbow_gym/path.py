@@ -1,0 +1,101 @@
+"""Closed paths in space as Fourier series of an angle a, (rows, 3): rows 1, cos a, sin a, cos 2a, sin 2a, ..."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elbow_gym.parameters import Array
+
+Point = tuple[float, float, float]
+
+PLANES = ("xy", "xz", "yz", "radial")
+SHAPES = ("circle", "figure_eight")
+
+
+def as_plane(plane: object) -> str | tuple[str, ...]:
+    """A plane's name, "random", or names of planes to draw from. ValueError on anything else."""
+    if isinstance(plane, str) and plane in (*PLANES, "random"):
+        return plane
+    if isinstance(plane, list | tuple) and plane:
+        names = tuple(name for name in cast("Sequence[object]", plane) if isinstance(name, str) and name in PLANES)
+        if len(names) == len(cast("Sequence[object]", plane)):
+            return names
+    raise ValueError(f'circle plane must be one of {PLANES}, a list of them or "random", got {plane!r}')
+
+
+def as_shape(shape: object) -> str | tuple[Point, ...]:
+    """A shape's name, or the points [m] of a path of one's own, three or more. ValueError on anything else."""
+    if isinstance(shape, str) and shape in SHAPES:
+        return shape
+    if not isinstance(shape, list | tuple | np.ndarray):
+        raise ValueError(f"circle shape must be one of {SHAPES} or a list of points, got {shape!r}")
+    points = cast("Sequence[object]", shape)
+    if len(points) < 3:
+        raise ValueError(f"circle shape must have at least 3 points, got {len(points)}")
+    return tuple(_as_point(point) for point in points)
+
+
+def _as_point(point: object) -> Point:
+    if isinstance(point, list | tuple | np.ndarray):
+        entries = cast("Sequence[object]", point)
+        if len(entries) == 3 and all(isinstance(entry, numbers.Real) and math.isfinite(entry) for entry in entries):
+            x, y, z = (float(cast("float", entry)) for entry in entries)
+            return x, y, z
+    raise ValueError(f"circle shape must have points of three finite numbers, got {point!r}")
+
+
+def plane_axes(plane: str, center: Sequence[float]) -> tuple[Array, Array]:
+    """First and second unit vector of a plane, each (3,); "radial" is the upright one through z axis and centre."""
+    if plane == "radial":
+        x, y, _ = center
+        rho = math.hypot(x, y)
+        first = np.array([x / rho, y / rho, 0.0]) if rho > 0.0 else np.array([1.0, 0.0, 0.0])
+        return first, np.array([0.0, 0.0, 1.0])
+    unit = np.eye(3)
+    return unit["xyz".index(plane[0])], unit["xyz".index(plane[1])]
+
+
+def circle_path(center: Sequence[float], radius: float, axes: tuple[Array, Array]) -> Array:
+    """Rows of center + radius (first cos a + second sin a) [m], (3, 3)."""
+    first, second = axes
+    return np.array([center, radius * first, radius * second])
+
+
+def figure_eight_path(center: Sequence[float], radius: float, axes: tuple[Array, Array]) -> Array:
+    """Rows of center + radius (first cos a + second sin 2a / 2) [m], (5, 3): a lying eight, `radius` its half width.
+
+    It starts where the circle of this radius does, in the same direction and at the same speed.
+    """
+    first, second = axes
+    zero = np.zeros(3)
+    return np.array([center, radius * first, zero, zero, radius / 2.0 * second])
+
+
+def points_path(points: ArrayLike) -> Array:
+    """Rows of the path [m] that passes the m points (m, 3) at a = 2 pi j / m: trigonometric interpolation.
+
+    Shape (1 + 2 floor(m / 2), 3). Of the highest wave an even number of points tells the cosine alone.
+    """
+    points = np.asarray(points, dtype=np.float64)
+    m = len(points)
+    spectrum = np.fft.rfft(points, axis=0) / m
+    rows = np.empty((2 * len(spectrum) - 1, 3))
+    rows[0] = spectrum[0].real
+    rows[1::2], rows[2::2] = 2.0 * spectrum[1:].real, -2.0 * spectrum[1:].imag
+    if m % 2 == 0:
+        rows[-2], rows[-1] = spectrum[-1].real, 0.0
+    return rows
+
+
+def path_rate(path: Array, rate: float) -> Array:
+    """Rows of the path's derivative to time [m/s], of the path's shape, where the angle grows at `rate` [rad/s]."""
+    order = rate * np.arange(1.0, len(path) // 2 + 1)[:, None]
+    derivative = np.zeros_like(path)
+    derivative[1::2], derivative[2::2] = order * path[2::2], -order * path[1::2]
+    return derivative
