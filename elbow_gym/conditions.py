@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from elbow_gym.motors import COULOMB_VELOCITY
 from elbow_gym.parameters import ArmParameters, non_negative, positive
 from elbow_gym.table import TableParameters, as_table
 
@@ -51,12 +52,12 @@ class Conditions:
         rough = bool((arm.of_motors("gear_coulomb_friction") > 0.0).any())
         return self.heat or self.supply_resistance > 0.0 or rough
 
-    def longest_timestep(self, arm: ArmParameters, gear_speed: float) -> tuple[float, str]:
-        """The longest stable RK4 step [s] and what sets it; `gear_speed` smooths the gears' friction [rad/s]."""
+    def longest_timestep(self, arm: ArmParameters) -> tuple[float, str]:
+        """The longest stable RK4 step [s] and what sets it."""
         resistance, inductance = arm.of_motors("armature_resistance"), arm.of_motors("armature_inductance")
         limits = {"L / R": STABILITY_LIMIT / float((resistance / inductance).max())}
         gear = arm.of_motors("reflected_coulomb_friction") / arm.of_motors("reflected_inertia")
-        rate = float(gear.max()) / gear_speed
+        rate = float(gear.max()) / COULOMB_VELOCITY
         if rate > 0.0:
             limits["gear_coulomb_friction"] = STABILITY_LIMIT / rate
         if self.surface is not None:

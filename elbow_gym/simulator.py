@@ -10,30 +10,30 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from elbow_gym import kernel
-from elbow_gym.kinematics import constraint_jacobian, elbow_heights
+from elbow_gym.conditions import Conditions
+from elbow_gym.kinematics import elbow_heights, pitches
 from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows, positive
+from elbow_gym.readings import Readings
 from elbow_gym.sharing import Sharing
 from elbow_gym.tables import as_batch, parameter_table
 
-# Explicit RK4 is stable up to 2.785 / rate; the fastest rate of this family is the armature's R / L.
-STABILITY_LIMIT = 2.7
 # A given pose may be off the elbows' plane by this much [m], its rates by this much [m/s].
 PLANE_TOLERANCE = 1e-8
 RATE_TOLERANCE = 1e-6
 
 
-class Simulator:
+class Simulator(Readings):
     """B arms side by side under piecewise constant voltages, by RK4 with the energies integrated alongside.
 
     Args:
         arm: an ArmParameters or a preset name.
         elbows: 0, 1, 2 as in the paper, or joint numbers held at z = 0.
         num_envs: B, the number of arms.
-        timestep: RK4 step [s], below 2.7 times the smallest L / R.
+        timestep: RK4 step [s], below 2.7 times the smallest L / R, and at most 0.001 with a table.
         num_threads: threads over which blocks of arms are spread; the results do not depend on it.
+        conditions: fields of `Conditions`: payload, table, elbow_friction, heat, supply_resistance...
 
-    Arrays are (B, n), elbow forces (B, p), positions (B, 3); those returned by properties are read-only views of
-    the running state. Raises ValueError naming the argument.
+    Raises ValueError naming the argument.
     """
 
     def __init__(
@@ -44,6 +44,7 @@ class Simulator:
         *,
         timestep: float = 0.002,
         num_threads: int = 1,
+        **conditions: Any,
     ) -> None:
         self.arm = as_arm(arm)
         self.elbows = as_elbows(elbows, self.arm.n_joints)
@@ -53,17 +54,22 @@ class Simulator:
             if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 1:
                 raise ValueError(f"{name} must be a positive integer, got {count!r}")
         self.num_envs = int(num_envs)
+        self.conditions = Conditions(**conditions)
         self.timestep = positive("timestep", timestep)
-        limit = STABILITY_LIMIT * float(
-            (self.arm.of_motors("armature_inductance") / self.arm.of_motors("armature_resistance")).min()
-        )
+        limit, reason = self.conditions.longest_timestep(self.arm)
         if self.timestep > limit:
-            raise ValueError(f"timestep must be at most {limit:.3g} s (RK4's limit for L / R), got {timestep}")
+            raise ValueError(f"timestep must be at most {limit:.3g} s (RK4's limit for {reason}), got {timestep}")
+        self._switches = {
+            "table": self.conditions.surface is not None,
+            "rubbing": self.conditions.elbow_friction > 0.0 and bool(self.elbows),
+            "drive": self.conditions.drive(self.arm),
+        }
         n = self.arm.n_joints
         self._elbow_index = np.array(self.elbows, dtype=np.int64)
-        self._state = np.zeros((self.num_envs, kernel.STATE_ROWS, n))
+        rows = kernel.SWITCHED_STATE_ROWS if any(self._switches.values()) else kernel.STATE_ROWS
+        self._state = np.zeros((self.num_envs, rows, n))
         self._summary = np.zeros((self.num_envs, kernel.SUMMARY_COLUMNS + len(self.elbows)))
-        self._parameters = np.repeat(parameter_table(self.arm)[None], self.num_envs, axis=0)
+        self._parameters = np.repeat(parameter_table(self.arm, self.conditions)[None], self.num_envs, axis=0)
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
         self._num_threads = int(num_threads)
         self._attach()
@@ -75,7 +81,7 @@ class Simulator:
     def _attach(self) -> None:
         # Up to two arms the lanes of a block would mostly idle.
         lanes = 1 if self.num_envs <= 2 else kernel.BLOCK_LANES
-        self._advance, _, self._settle = kernel.kernel(lanes)
+        self._advance, _, self._settle = kernel.kernel(lanes, **self._switches)
         self._sharing = Sharing(self.num_envs, lanes, self._num_threads)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -92,6 +98,7 @@ class Simulator:
         q_dot: ArrayLike | None = None,
         current: ArrayLike | None = None,
         mask: NDArray[np.bool_] | None = None,
+        temperature_rise: ArrayLike | None = None,
     ) -> None:
         """Sets state and zeroes clocks and meters of all arms, or of those in `mask` (B,).
 
@@ -101,9 +108,12 @@ class Simulator:
             q_dot: rates [rad/s] that keep the elbows on the table to 1e-6 m/s; zero when None.
             current: armature currents [A]; zero when None.
             mask: which arms, shape (B,); all when None.
+            temperature_rise: of the windings above the ambient [K]; zero when None.
         """
-        q, q_dot, current, chosen = self.check_state(q, q_dot, current, mask)
+        q, q_dot, current, rise, chosen = self.check_state(q, q_dot, current, mask, temperature_rise)
         self._state[chosen] = 0.0
+        if self.conditions.heat:
+            self._state[chosen, kernel.STATE_ROWS + kernel.SWITCHED_STATE.index("temperature_rise")] = rise[chosen]
         self._state[chosen, 0] = q[chosen]
         self._state[chosen, 1] = q_dot[chosen]
         self._state[chosen, 2] = current[chosen]
@@ -124,7 +134,7 @@ class Simulator:
             self._settle(settled, self._parameters, self._elbow_index)
             if not (np.abs(settled).max() < kernel.LARGEST_ANGLE):
                 raise ValueError(f"q must be near a pose with the elbows {self.elbows} at z = 0, got {q!r}")
-            self._check_on_table(settled, np.zeros_like(settled))
+            self._check_on_table(settled, np.zeros_like(settled), self._parameters[:, 0])
         return settled
 
     def check_state(
@@ -133,34 +143,37 @@ class Simulator:
         q_dot: ArrayLike | None = None,
         current: ArrayLike | None = None,
         mask: NDArray[np.bool_] | None = None,
-    ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+        temperature_rise: ArrayLike | None = None,
+    ) -> tuple[Array, Array, Array, Array, NDArray[np.bool_]]:
         """The arguments of `reset` as full arrays. Raises its ValueErrors and changes nothing."""
         n = self.arm.n_joints
         shape = (self.num_envs, n)
         q = self._nominal if q is None else as_batch("q", q, shape)
         q_dot = as_batch("q_dot", np.zeros(n) if q_dot is None else q_dot, shape)
         current = as_batch("current", np.zeros(n) if current is None else current, shape)
+        rise = as_batch("temperature_rise", np.zeros(n) if temperature_rise is None else temperature_rise, shape)
+        if rise.any() and not self.conditions.heat:
+            raise ValueError(f"temperature_rise must be zero unless heat is True, got {np.abs(rise).max():g} K")
         chosen = np.ones(self.num_envs, dtype=np.bool_) if mask is None else np.asarray(mask, dtype=np.bool_)
         if chosen.shape != (self.num_envs,):
             raise ValueError(f"mask must have shape {(self.num_envs,)}, got {chosen.shape}")
         if np.abs(q).max() >= kernel.LARGEST_ANGLE:
             raise ValueError(f"q must be within {kernel.LARGEST_ANGLE:g} rad, got {np.abs(q).max():g}")
         if self.elbows:
-            self._check_on_table(q[chosen], q_dot[chosen])
-        return q, q_dot, current, chosen
+            self._check_on_table(q[chosen], q_dot[chosen], self._parameters[chosen, 0])
+        return q, q_dot, current, rise, chosen
 
-    def _check_on_table(self, q: Array, q_dot: Array) -> None:
-        height = np.abs(elbow_heights(self.arm, q, self.elbows))
+    def _check_on_table(self, q: Array, q_dot: Array, length: Array) -> None:
+        joints = [elbow - 2 for elbow in self.elbows]
+        height = np.abs(np.cumsum(length * np.cos(pitches(q)), axis=-1)[:, joints])
         if height.size and height.max() > PLANE_TOLERANCE:
             joint = self.elbows[int(height.max(axis=0).argmax())]
             raise ValueError(
                 f"q must hold elbow joint {joint} at z = 0 to {PLANE_TOLERANCE:g} m, got {height.max():.6g} m off"
             )
-        for pose, rate in zip(q, q_dot, strict=True):
-            if rate.any():
-                speed = np.abs(constraint_jacobian(self.arm, pose, self.elbows) @ rate).max()
-                if speed > RATE_TOLERANCE:
-                    raise ValueError(f"q_dot must keep the elbows at z = 0, got {speed:.6g} m/s off the table")
+        rise = np.abs(np.cumsum(length * np.sin(pitches(q)) * pitches(q_dot), axis=-1)[:, joints])
+        if rise.size and rise.max() > RATE_TOLERANCE:
+            raise ValueError(f"q_dot must keep the elbows at z = 0, got {rise.max():.6g} m/s off the table")
 
     def step(self, voltage: ArrayLike, n_substeps: int = 1) -> None:
         """Advances every arm by n_substeps timesteps under constant terminal voltages [V], (B, n) or (n,).
@@ -210,81 +223,6 @@ class Simulator:
                 raise ValueError(f"state[{name!r}] must have shape {array.shape}, got {got}")
         for name, array in own.items():
             array[...] = state[name]
-
-    def _row(self, row: int) -> Array:
-        view = self._state[:, row]
-        view.flags.writeable = False
-        return view
-
-    def _columns(self, first: int, end: int | None) -> Array:
-        view = self._summary[:, first:end]
-        view.flags.writeable = False
-        return view
-
-    @property
-    def q(self) -> Array:
-        """Relative joint angles [rad], (B, n)."""
-        return self._row(0)
-
-    @property
-    def q_dot(self) -> Array:
-        """Joint rates [rad/s], (B, n)."""
-        return self._row(1)
-
-    @property
-    def current(self) -> Array:
-        """Armature currents [A], (B, n)."""
-        return self._row(2)
-
-    @property
-    def electrical_energy(self) -> Array:
-        """Integral of v i since the reset [J], (B, n); signed, regeneration counts back."""
-        return self._row(3)
-
-    @property
-    def drawn_energy(self) -> Array:
-        """Integral of max(v i, 0) since the reset [J], (B, n)."""
-        return self._row(4)
-
-    @property
-    def copper_loss(self) -> Array:
-        """Integral of R i^2 since the reset [J], (B, n)."""
-        return self._row(5)
-
-    @property
-    def friction_loss(self) -> Array:
-        """Integral of (D + D_m) q_dot^2 since the reset [J], (B, n)."""
-        return self._row(6)
-
-    @property
-    def link_work(self) -> Array:
-        """Integral of tau q_dot since the reset [J], (B, n), tau from eq. 12."""
-        return self._row(7)
-
-    @property
-    def hand_position(self) -> Array:
-        """Hand position [m], (B, 3), in world x, y, z."""
-        return self._columns(kernel.HAND, kernel.HAND + 3)
-
-    @property
-    def lowest_height(self) -> Array:
-        """Height of the lowest of joints 3..n and the hand [m], (B,)."""
-        return self._columns(kernel.LOWEST, kernel.LOWEST + 1)[:, 0]
-
-    @property
-    def below_table(self) -> Array:
-        """Time since the reset with a joint or the hand more than 1e-6 m under z = 0 [s], (B,)."""
-        return self._columns(kernel.BELOW_TABLE, kernel.BELOW_TABLE + 1)[:, 0]
-
-    @property
-    def valid(self) -> NDArray[np.bool_]:
-        """False where the last step left what float64 can represent (the state is then the one before), (B,)."""
-        return self._summary[:, kernel.VALID] > 0.0
-
-    @property
-    def elbow_force(self) -> Array:
-        """f_n of the table on each elbow along +z [N], (B, p); negative when the table pulls."""
-        return self._columns(kernel.SUMMARY_COLUMNS, None)
 
     @property
     def time(self) -> Array:
