@@ -10,6 +10,7 @@ from gymnasium.envs.registration import register  # pyright: ignore[reportUnknow
 if TYPE_CHECKING:
     from elbow_gym.circle import Circle
     from elbow_gym.env import ElbowArmEnv
+    from elbow_gym.multi_objective import MOElbowArmEnv
     from elbow_gym.parameters import ArmParameters, LinkParameters, MotorParameters, paper_arm
     from elbow_gym.simulator import Simulator
     from elbow_gym.table import TableParameters
@@ -24,6 +25,7 @@ _HOMES = {
     "ElbowArmEnv": "env",
     "ElbowArmVectorEnv": "vector_env",
     "LinkParameters": "parameters",
+    "MOElbowArmEnv": "multi_objective",
     "MotorParameters": "parameters",
     "Simulator": "simulator",
     "TableParameters": "table",
@@ -36,6 +38,7 @@ __all__ = [
     "ElbowArmEnv",
     "ElbowArmVectorEnv",
     "LinkParameters",
+    "MOElbowArmEnv",
     "MotorParameters",
     "Simulator",
     "TableParameters",
@@ -49,8 +52,36 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-register(
-    id="ElbowArm-v0",
-    entry_point="elbow_gym.env:ElbowArmEnv",
-    vector_entry_point="elbow_gym.vector_env:ElbowArmVectorEnv",
-)
+# The table alone carries the arm: the policy decides where to brace.
+TABLE: dict[str, Any] = {"elbows": 0, "table": True}
+# An arm and a circle that nobody has met before.
+RANDOM: dict[str, Any] = {
+    "circle": {
+        "center": [[1.45, 1.55], [1.45, 1.55], [0.35, 0.45]],
+        "radius": [0.05, 0.15],
+        "period": [4.0, 6.0],
+        "phase": "random",
+        "direction": "random",
+    },
+    "randomize": {
+        "mass": [0.8, 1.2],
+        "length": [0.98, 1.02],
+        "joint_viscous_friction": [0.7, 1.3],
+        "gear_viscous_friction": [0.7, 1.3],
+        "torque_constant": [0.95, 1.05],
+        "armature_resistance": [0.9, 1.1],
+        "supply_voltage": [0.95, 1.05],
+        "payload": [0.0, 0.1],
+        "sensor_noise": [0.0, 0.002],
+    },
+}
+
+for _name, _arguments in (("ElbowArm", {}), ("ElbowArmTable", TABLE), ("ElbowArmRandom", RANDOM)):
+    register(
+        id=f"{_name}-v0",
+        entry_point="elbow_gym.env:ElbowArmEnv",
+        vector_entry_point="elbow_gym.vector_env:ElbowArmVectorEnv",
+        kwargs=_arguments,
+    )
+# Gymnasium's own checker knows scalar rewards only.
+register(id="mo-ElbowArm-v0", entry_point="elbow_gym.multi_objective:MOElbowArmEnv", disable_env_checker=True)

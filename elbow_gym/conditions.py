@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from elbow_gym.motors import COULOMB_VELOCITY
@@ -20,7 +21,7 @@ class Conditions:
 
     payload: float = 0.0
     """Point mass at the hand [kg]."""
-    table: bool | TableParameters | dict[str, float] | None = None
+    table: bool | TableParameters | Mapping[str, float] | None = None
     """A compliant table under joints 3..n and the hand: True for the default one, or its fields."""
     elbow_friction: float = 0.0
     """Coulomb's coefficient of rigid elbows on the table, where they push [-]."""

@@ -73,6 +73,9 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | hand_position | 3 | m | 0.5 | 10 | hand minus the circle's centre, along x, y, z |
     | lookahead_error | 3 | m | 0.5 | 10 | hand minus the target 0.1 s later, along x, y, z |
     | target_angle | 2 | - | 1 | 1 | cosine and sine of the target's angle on the circle |
+    | contact_force | n-1, with a table | N | 5 | 10000 | the table's normal force, joints 3 to n and the hand |
+    | temperature_rise | n, with heat | K | 50 | 10000 | of the windings above the ambient |
+    | pending_voltage | n per period of the longest delay | V | 24 | 10000 | voltages still on their way, newest first |
 
     ## Rewards
 
@@ -84,7 +87,8 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     The paper's start pose (or, with `start="on_target"`, the pose with the hand on the circle) at rest without
     current, plus normal noise of `start_noise` rad per joint, projected onto the elbows' plane.
-    `reset(options={"state": {"q": ..., "q_dot": ..., "current": ...}, "phase": ...})` sets it exactly.
+    `reset(options={"state": {"q": ..., "q_dot": ..., "current": ...}, "phase": ...})` sets it exactly; the options
+    `circle` and `parameters` (dicts) stand in for what would be drawn.
 
     ## Episode End
 
@@ -98,19 +102,30 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | elbows | 2 | 0, 1, 2 as in the paper (joints (), (4,), (4, 7)), or a tuple of joint numbers |
     | arm | "paper" | preset name, an `ArmParameters`, or its JSON dict |
     | control_frequency | 50.0 | how often an action is read [Hz] |
-    | timestep | 0.002 | longest RK4 step [s] |
+    | timestep | None | longest RK4 step [s]: 0.002, with a table 0.001 |
     | duration | 5.0 | episode length [s] |
     | voltage_limit | 24.0 | supply voltage of every motor [V] |
     | action_unit | "fraction" | "fraction" of the supply voltage, or "volt" |
     | start | "paper" | "paper" or "on_target" |
     | start_noise | 0.02 | standard deviation of the start pose [rad] |
-    | circle | None | dict of center, radius, period, plane, phase, direction; phase may be "random" |
+    | circle | None | dict of center, radius, period, plane, phase, direction, shape; ranges or "random" are drawn |
     | tracking_weight | 1.0 | reward per metre of tracking error |
     | energy_weight | 0.001 | reward per watt of electrical power |
-    | regeneration | True | whether negative electrical power is credited |
+    | regeneration | True | whether negative electrical power is credited, and taken back by the supply |
+    | table | False | a compliant table that cannot pull: True, or a dict of stiffness, dissipation, friction... |
+    | elbow_friction | 0.0 | Coulomb's coefficient of rigid elbows, where they push |
+    | gear_coulomb_friction | None | Coulomb friction of every gear at the motor shaft [N m] |
+    | heat | False | whether windings warm up, and their resistance with them |
+    | supply_resistance | 0.0 | inside the motors' common supply [ohm] |
+    | payload | 0.0 | mass at the hand [kg] |
+    | randomize | None | dict of ranges drawn anew at each reset, see `elbow_gym.randomization` |
 
     `info` holds tracking_error [m], electrical_power [W], electrical_energy, drawn_energy and link_work [J] since the
     reset, reward_tracking, reward_energy, voltage [V], elbow_force [N] and below_table [s].
+
+    A table adds contact_force [N] (joints 3 to n and the hand; radial, tangential, normal), load_bearing and
+    contact_loss [J]; heat adds temperature_rise [K] and overheated; a supply's resistance adds supply_loss [J]. A
+    reset tells what it drew under `parameters` and `circle`.
 
     ## Version History
 
@@ -201,11 +216,16 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         for name in ("episodes", "generator"):
             if name not in state:
                 raise ValueError(f"state must have the entry {name!r}, got {sorted(state)}")
-        self._episodes.set_state(state["episodes"])
+        self._episodes.set_state(state["episodes"], [self.np_random])
         self.np_random.bit_generator.state = state["generator"]
         self._ready = True
 
 
-def single(info: dict[str, Array]) -> dict[str, Any]:
-    """The info of the only arm: floats, and arrays of their own."""
-    return {key: float(rows[0]) if rows.ndim == 1 else rows[0] for key, rows in info.items()}
+def single(info: Mapping[str, Any]) -> dict[str, Any]:
+    """The info of the only arm: plain numbers and truths, and arrays of their own."""
+    return {
+        key: single(cast("Mapping[str, Any]", rows))
+        if isinstance(rows, Mapping)
+        else (rows[0].item() if rows.ndim == 1 else rows[0])
+        for key, rows in info.items()
+    }

@@ -23,7 +23,8 @@ from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
+from numba.extending import intrinsic
 
 # Rows of a block's public arrays: state (B, STATE_ROWS, n) and parameters (B, PARAMETER_ROWS, n).
 STATE = ("q", "q_dot", "current", "electrical_energy", "drawn_energy", "copper_loss", "friction_loss", "link_work")
@@ -197,6 +198,22 @@ def _compiled(function, cached=False, inlined=False):
 _sincos = _compiled(sincos)
 
 
+def _multiply_and_add(context, a, b, c):
+    def generate(_, builder, __, values):
+        return builder.fma(*values)
+
+    return types.float64(types.float64, types.float64, types.float64), generate
+
+
+_rounded_once: Any = intrinsic(_multiply_and_add)
+
+
+@_compiled
+def fused(a, b, c):
+    """A b + c of floats, rounded once."""
+    return _rounded_once(a, b, c)
+
+
 @_compiled
 def _path_point(coefficients, c, s, out):
     ch, sh = c, s
@@ -209,13 +226,16 @@ def _path_point(coefficients, c, s, out):
 
 
 def _drive(action, highest, volts, voltage):
-    """Fills voltage (B, n) with the clipped action (B, n) in volts. False when an action is not a number."""
+    """Fills voltage (B, n) with the clipped action (B, n) in volts. False when an action is not a number.
+
+    highest (B,) is each arm's largest action, volts (B,) what a unit of it is.
+    """
     numbers = True
     for b in range(action.shape[0]):
         for a in range(action.shape[1]):
             value = action[b, a]
             numbers = numbers and not np.isnan(value)
-            voltage[b, a] = min(max(value, -highest), highest) * volts
+            voltage[b, a] = min(max(value, -highest[b]), highest[b]) * volts[b]
     return numbers
 
 
@@ -246,7 +266,7 @@ def _observe(
         s_later, c_later = _sincos(angle[b] + lookahead[b])
         _path_point(coefficients[b], c_later, s_later, later)
         squared = 0.0
-        for m in range(observation.shape[1]):
+        for m in range(3 * n + 11):
             axis = (m - 3 * n) % 3
             if m < n:
                 value = state[b, 0, m] - pose[m]
@@ -275,7 +295,7 @@ def _observe(
         figures[5, b] = 0.0 - tracking_weight * figures[0, b]
         figures[6, b] = 0.0 - energy_weight * figures[1, b]
         figures[7, b] = summary[b, BELOW_TABLE]
-        figures[8, b] = figures[5, b] + figures[6, b]
+        figures[8, b] = fused(-figures[1, b], energy_weight, figures[5, b])
         spent[b] = paid
 
 

@@ -124,6 +124,14 @@ class Simulator(Readings):
         # Looking at the other arms' last state again does not make it the outcome of their last step.
         self._summary[~chosen, kernel.VALID] = valid[~chosen]
 
+    def parameters(self, chosen: NDArray[np.int64]) -> Array:
+        """A copy of the kernel's parameter rows of some arms, (k, PARAMETER_ROWS, n)."""
+        return self._parameters[chosen]
+
+    def set_parameters(self, chosen: NDArray[np.int64], rows: Array) -> None:
+        """Gives some arms other parameter rows, as `tables.parameter_rows` makes them, from now on."""
+        self._parameters[chosen] = rows
+
     def on_table(self, q: ArrayLike) -> Array:
         """The nearest poses (least change of absolute pitch) with every elbow at z = 0 [rad], (B, n).
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -29,17 +29,26 @@ class Feature(NamedTuple):
     limit: float
     """The quantity saturates here."""
     meaning: str
+    suffixes: tuple[str, ...] = ()
+    """Of the entries' names; joint numbers where there are none."""
 
 
+AXES = ("x", "y", "z")
 FEATURES = (
     Feature("joint_angle", "rad", 0.3, 10.0, "joint angle minus the start pose's"),
     Feature("joint_velocity", "rad/s", 2.0, 100.0, "joint velocity"),
     Feature("current", "A", 5.0, 500.0, "armature current"),
-    Feature("hand_error", "m", 0.5, 10.0, "hand minus target, along x, y, z"),
-    Feature("hand_position", "m", 0.5, 10.0, "hand minus the circle's centre, along x, y, z"),
-    Feature("lookahead_error", "m", 0.5, 10.0, "hand minus the target 0.1 s later, along x, y, z"),
-    Feature("target_angle", "-", 1.0, 1.0, "cosine and sine of the target's angle on the circle"),
+    Feature("hand_error", "m", 0.5, 10.0, "hand minus target, along x, y, z", AXES),
+    Feature("hand_position", "m", 0.5, 10.0, "hand minus the circle's centre, along x, y, z", AXES),
+    Feature("lookahead_error", "m", 0.5, 10.0, "hand minus the target 0.1 s later, along x, y, z", AXES),
+    Feature("target_angle", "-", 1.0, 1.0, "cosine and sine of the target's angle on the circle", ("cos", "sin")),
 )
+SWITCHED_FEATURES = (
+    Feature("contact_force", "N", 5.0, 1e4, "the table's normal force, joints 3 to n and the hand"),
+    Feature("temperature_rise", "K", 50.0, 1e4, "of the windings above the ambient"),
+    Feature("pending_voltage", "V", 24.0, 1e4, "voltages still on their way, newest first"),
+)
+"""Behind the others, in environments where they are switched on."""
 
 
 @dataclass(frozen=True)
@@ -47,19 +56,26 @@ class ObservationLayout:
     """Names, units, scales and bounds of the observation of an arm with `n_joints` joints."""
 
     n_joints: int
+    switched: Mapping[str, int] = field(default_factory=dict[str, int])
+    """Entries of each switched feature; none where it is missing or zero."""
+
+    @cached_property
+    def features(self) -> tuple[Feature, ...]:
+        """The features that the observation has, in their order."""
+        return (*FEATURES, *(feature for feature in SWITCHED_FEATURES if self.switched.get(feature.name)))
 
     @cached_property
     def sizes(self) -> tuple[int, ...]:
         """Entries of each feature."""
-        per_joint = {"joint_angle", "joint_velocity", "current"}
-        return tuple(self.n_joints if f.name in per_joint else 2 if f.name == "target_angle" else 3 for f in FEATURES)
+        return tuple(self.switched.get(f.name, len(f.suffixes) or self.n_joints) for f in self.features)
 
     @cached_property
     def slices(self) -> dict[str, slice]:
         """Where each feature stands in the observation."""
         ends = np.cumsum(self.sizes)
         return {
-            f.name: slice(int(end) - size, int(end)) for f, size, end in zip(FEATURES, self.sizes, ends, strict=True)
+            f.name: slice(int(end) - size, int(end))
+            for f, size, end in zip(self.features, self.sizes, ends, strict=True)
         }
 
     @property
@@ -69,23 +85,27 @@ class ObservationLayout:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """One name per entry, with its unit: `joint_angle_1 [rad]`, `hand_error_x [m]`."""
-        suffixes = {3: "xyz", 2: ("cos", "sin")}
+        """One name per entry, with its unit: `joint_angle_1 [rad]`, `hand_error_x [m]`, `contact_force_hand [N]`."""
+        n = self.n_joints
+        suffixes = {
+            "contact_force": (*range(3, n + 1), "hand"),
+            "pending_voltage": [f"{1 + k // n}_{1 + k % n}" for k in range(self.switched.get("pending_voltage", 0))],
+        }
         return tuple(
             f"{f.name}_{suffix} [{f.unit}]"
-            for f, size in zip(FEATURES, self.sizes, strict=True)
-            for suffix in (range(1, size + 1) if f.unit in ("rad", "rad/s", "A") else suffixes[size])
+            for f in self.features
+            for suffix in suffixes.get(f.name, f.suffixes or range(1, n + 1))
         )
 
     @cached_property
     def scale(self) -> Array:
         """Quantity per unit of each entry, in the entry's SI unit."""
-        return np.repeat([f.scale for f in FEATURES], self.sizes)
+        return np.repeat([f.scale for f in self.features], self.sizes)
 
     @cached_property
     def high(self) -> NDArray[np.float32]:
         """Upper bounds of the scaled entries; the lower ones are their negatives."""
-        return np.repeat([f.limit / f.scale for f in FEATURES], self.sizes).astype(np.float32)
+        return np.repeat([f.limit / f.scale for f in self.features], self.sizes).astype(np.float32)
 
     def decode(self, observation: ArrayLike) -> dict[str, Array]:
         """The quantities in SI units, by feature name, each (..., size)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -151,7 +151,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             raise
         self._over[chosen] = False
         self._started[chosen] = True
-        sight = self._episodes.look()
+        sight = self._episodes.look(~chosen)
         return sight.observation, masked(self._episodes.info(sight), chosen)
 
     def step(
@@ -168,38 +168,43 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             raise gym.error.ResetNeeded(
                 f"reset must be called with options['reset_mask'] for arms that are over, got {np.flatnonzero(waiting)}"
             )
-        outcome = self._episodes.step(array)
+        outcome = self._episodes.step(array, waiting if waiting.any() else None)
         over = outcome.terminated | outcome.truncated
         if not over.any() and not waiting.any():
             everyone = np.ones(self.num_envs, dtype=np.bool_)
             return (*outcome[:4], masked(outcome.info, everyone))
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             return self._same_step(outcome, over)
+        drawn: dict[str, Any] = {}
         if waiting.any():
             # Arms that ended a step ago start anew instead; what they did meanwhile does not count.
             self._episodes.reset(self._generators, waiting)
-            sight = self._episodes.look()
+            sight = self._episodes.look(~waiting)
             info = self._episodes.info(sight)
             outcome.observation[waiting] = sight.observation[waiting]
             for array in (outcome.reward, outcome.terminated, outcome.truncated):
                 array[waiting] = 0
             for key, rows in outcome.info.items():
                 rows[waiting] = info[key][waiting]
+            drawn = masked(drawn_only(info, outcome.info), waiting)
         self._over = outcome.terminated | outcome.truncated
-        return (*outcome[:4], masked(outcome.info, np.ones(self.num_envs, dtype=np.bool_)))
+        return (*outcome[:4], {**masked(outcome.info, np.ones(self.num_envs, dtype=np.bool_)), **drawn})
 
     def _same_step(self, outcome: Any, over: Flags) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         final_obs = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(over):
             final_obs[i] = outcome.observation[i].copy()
         self._episodes.reset(self._generators, over)
-        sight = self._episodes.look()
+        sight = self._episodes.look(~over)
         info = self._episodes.info(sight)
         outcome.observation[over] = sight.observation[over]
-        final_info = {key: np.where(spread(over, rows), rows, 0.0) for key, rows in outcome.info.items()}
+        final_info: dict[str, Any] = {
+            key: np.where(spread(over, rows), rows, np.zeros_like(rows)) for key, rows in outcome.info.items()
+        }
         for key, rows in outcome.info.items():
             rows[over] = info[key][over]
         infos = masked(outcome.info, np.ones(self.num_envs, dtype=np.bool_))
+        infos.update(masked(drawn_only(info, outcome.info), over))
         infos.update(final_obs=final_obs, _final_obs=over.copy(), final_info=masked(final_info, over))
         infos["_final_info"] = over.copy()
         return (*outcome[:4], infos)
@@ -220,7 +225,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
                 raise ValueError(f"state must have the entry {name!r}, got {sorted(state)}")
         if len(state["generators"]) != self.num_envs:
             raise ValueError(f"state['generators'] must have {self.num_envs} entries, got {len(state['generators'])}")
-        self._episodes.set_state(state["episodes"])
+        self._episodes.set_state(state["episodes"], self.np_random)
         for generator, saved in zip(self.np_random, state["generators"], strict=True):
             generator.bit_generator.state = saved
         self._over = np.array(state["over"], dtype=np.bool_)
@@ -232,8 +237,16 @@ def spread(mask: Flags, rows: Array) -> Flags:
     return mask.reshape(-1, *([1] * (rows.ndim - 1)))
 
 
-def masked(info: dict[str, Array], mask: Flags) -> dict[str, Any]:
-    """Gymnasium's vector info: each key beside its `_key` mask of the arms that have it."""
-    full: dict[str, Any] = dict(info)
+def drawn_only(info: Mapping[str, Any], flows: Mapping[str, Any]) -> dict[str, Any]:
+    """What a reset's info says beyond a step's: the values that were drawn."""
+    return {key: rows for key, rows in info.items() if key not in flows}
+
+
+def masked(info: Mapping[str, Any], mask: Flags) -> dict[str, Any]:
+    """Gymnasium's vector info: each key beside its `_key` mask of the arms that have it, dicts inside likewise."""
+    full: dict[str, Any] = {
+        key: masked(cast("Mapping[str, Any]", rows), mask) if isinstance(rows, Mapping) else rows
+        for key, rows in info.items()
+    }
     full.update({f"_{key}": mask.copy() for key in info})
     return full

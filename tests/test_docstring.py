@@ -10,7 +10,7 @@ import pytest
 from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv
 from elbow_gym.kinematics import elbow_heights
 from elbow_gym.settings import Settings
-from elbow_gym.task import FEATURES, ObservationLayout
+from elbow_gym.task import FEATURES, SWITCHED_FEATURES, ObservationLayout
 
 PAGE = inspect.getdoc(ElbowArmEnv)
 
@@ -41,13 +41,34 @@ def test_observation_table_is_the_features():
         (name, unit, float(scale), float(limit), meaning)
         for name, _, unit, scale, limit, meaning in table("Observation Space")
     ]
-    assert rows == [tuple(feature) for feature in FEATURES]
+    assert rows == [feature[:5] for feature in (*FEATURES, *SWITCHED_FEATURES)]
 
 
 @pytest.mark.parametrize("n", [3, 10])
 def test_observation_table_counts_the_entries(n):
-    counts = tuple(n if entries == "n" else int(entries) for _, entries, *_ in table("Observation Space"))
+    rows = table("Observation Space")[: len(FEATURES)]
+    counts = tuple(n if entries == "n" else int(entries) for _, entries, *_ in rows)
     assert counts == ObservationLayout(n).sizes
+
+
+def test_switched_features_have_the_entries_that_the_table_says():
+    env = ElbowArmEnv(table=True, heat=True, randomize={"action_delay": [0, 2]})
+    sizes = dict(zip([name for name, *_ in table("Observation Space")], env.episodes.layout.sizes, strict=True))
+    assert (sizes["contact_force"], sizes["temperature_rise"], sizes["pending_voltage"]) == (9, 10, 20)
+    assert [entries.split(",")[0].split(" ")[0] for _, entries, *_ in table("Observation Space")[-3:]] == [
+        "n-1",
+        "n",
+        "n",
+    ]
+
+
+def test_switches_add_the_info_keys_that_the_page_names():
+    env = ElbowArmEnv(table=True, heat=True, supply_resistance=0.1, randomize={"payload": [0.0, 0.1]})
+    drawn = env.reset(seed=0)[1]
+    more = {"contact_force", "load_bearing", "contact_loss", "temperature_rise", "overheated", "supply_loss"}
+    assert set(drawn) - set(ElbowArmEnv().reset(seed=0)[1]) == {*more, "parameters"}
+    paragraph = PAGE.split("A table adds ")[1].split("\n\n")[0]
+    assert all(key in paragraph for key in (*more, "parameters"))
 
 
 def test_arguments_table_is_the_settings_with_their_defaults():

@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 import pickle
+from fractions import Fraction
 
 import cloudpickle
 import gymnasium as gym
@@ -128,7 +129,10 @@ def test_wrong_action_is_an_error_that_leaves_the_state_untouched(action, messag
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"pose": POSE}, r"options must have only the entries \['state', 'phase'\], got 'pose'"),
+        (
+            {"pose": POSE},
+            r"options must have only the entries \['state', 'phase', 'circle', .*\], got 'pose'",
+        ),
         ({"state": POSE}, r"options\['state'\] must be a dict, got "),
         ({"state": {}}, r"options\['state'\] must have the entry 'q', got \[\]"),
         ({"state": {"q": POSE, "v": POSE}}, r"options\['state'\] must have only the entries .*, got 'v'"),
@@ -214,7 +218,9 @@ def test_reward_is_error_and_power_and_power_adds_up_to_the_energy(regeneration)
     for action in 3.0 * ACTIONS:
         observation, reward, _, _, info = env.step(action)
         spent += info["electrical_power"] / 20.0
-        assert reward == info["reward_tracking"] + info["reward_energy"]
+        # Rounded once.
+        assert reward == float(Fraction(info["reward_tracking"]) - Fraction(info["electrical_power"]) * Fraction(0.001))
+        assert reward == pytest.approx(info["reward_tracking"] + info["reward_energy"], rel=1e-15)
         assert reward == pytest.approx(-(info["tracking_error"] + 0.001 * info["electrical_power"]), rel=1e-12)
         assert info["tracking_error"] == pytest.approx(np.linalg.norm(env.decode(observation)["hand_error"]), rel=1e-6)
         assert info["drawn_energy"] >= max(drawn, info["electrical_energy"])
