@@ -19,13 +19,20 @@ app = tyro.extras.SubcommandApp()
 
 
 @app.command
-def reproduce(output: Path = Path("reproduction"), publish: bool = False) -> None:
+def reproduce(output: Path = Path("reproduction"), publish: bool = False, table: bool = False) -> None:
     """The paper's three cases: Figs 1-25, the series, the numbers and a verdict on each of its claims.
 
     Args:
         output: folder for figures, CSV files and the verdict.
         publish: also refresh the README's picture and the committed numbers.
+        table: instead ask on a real table, which gives way and cannot pull, whether leaning on it saves energy: three
+            start poses under three frictions.
     """
+    if table:
+        from agents.tabletop_report import reproduce_on_table
+
+        reproduce_on_table(output, publish=publish)
+        return
     from agents.reproduce import reproduce as reproduce_paper
 
     reproduce_paper(output, publish=publish)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from elbow_gym.motors import COULOMB_VELOCITY
 from elbow_gym.parameters import ArmParameters, non_negative, positive
 from elbow_gym.table import TableParameters, as_table
@@ -57,10 +59,12 @@ class Conditions:
         """The longest stable RK4 step [s] and what sets it."""
         resistance, inductance = arm.of_motors("armature_resistance"), arm.of_motors("armature_inductance")
         limits = {"L / R": STABILITY_LIMIT / float((resistance / inductance).max())}
-        gear = arm.of_motors("reflected_coulomb_friction") / arm.of_motors("reflected_inertia")
-        rate = float(gear.max()) / COULOMB_VELOCITY
-        if rate > 0.0:
-            limits["gear_coulomb_friction"] = STABILITY_LIMIT / rate
+        coulomb = arm.of_motors("reflected_coulomb_friction")
+        if coulomb.any():
+            # Near standstill it adds to viscous friction; the rotor's is the least inertia that a joint can have.
+            viscous = np.array(arm.joint_viscous_friction) + arm.of_motors("reflected_viscous_friction")
+            rates = (coulomb / COULOMB_VELOCITY + viscous) / arm.of_motors("reflected_inertia")
+            limits["gear_coulomb_friction"] = STABILITY_LIMIT / float(rates[coulomb > 0.0].max())
         if self.surface is not None:
             softer = TableParameters().stiffness / self.surface.stiffness
             limits["the table"] = TABLE_TIMESTEP * min(1.0, softer**0.5)
