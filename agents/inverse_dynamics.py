@@ -1,8 +1,8 @@
 """Which torques, currents and voltages a motion needs: the equations of motion read backwards, for whole batches.
 
-Lagrange's equations in absolute pitch, where the mass matrix of the plane is S_ab cos(phi_a - phi_b): a third derivation
-beside the paper's Newton-Euler pass and the kernel's recursion. They are written in products alone, so that the
-same lines serve NumPy batches and CasADi's symbols.
+Lagrange's equations in absolute pitch, where the mass matrix of the plane is S_ab cos(phi_a - phi_b): a third
+derivation beside the paper's Newton-Euler pass and the kernel's recursion. They are written in products alone, so that
+the same lines serve NumPy batches and CasADi's symbols.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class InverseDynamics:
         self._below = np.array([[length[k] * (k + 1 < e) for e in self.elbows] for k in range(n)]).reshape(n, -1)
 
     def torque(self, q: Any, q_dot: Any, q_ddot: Any) -> Any:
-        """Generalised torque of a motion without elbows [N m], (..., n): rotor inertia and all friction in.   Eqs 22-25.
+        """Torque of a motion without elbows [N m], (..., n), rotor inertia and all friction in.   Eqs 22-25.
 
         Args:
             q: relative joint angles [rad], (..., n), NumPy arrays or CasADi rows (1, n).
@@ -87,9 +87,28 @@ class InverseDynamics:
         """C(q): height of each elbow [m], (..., p).   Eq. 18."""
         return np.cos(q @ self.to_pitch) @ self._below
 
+    def elbow_speeds(self, q: Any, q_dot: Any) -> Any:
+        """J_c q_dot: rate of each elbow's height [m/s], (..., p).   Eq. 17."""
+        return -(np.sin(q @ self.to_pitch) * (q_dot @ self.to_pitch)) @ self._below
+
     def elbow_torque(self, q: Any, elbow_force: Any) -> Any:
         """J_c^T f [N m], (..., n): what forces [N], (..., p), on the elbows turn the joints by.   Eq. 17."""
         return -(np.sin(q @ self.to_pitch) * (elbow_force @ self._below.T)) @ self.to_pitch.T
+
+    def held_acceleration(self, q: Array, q_dot: Array, q_ddot: Array) -> Array:
+        """The accelerations nearest to `q_ddot` that keep the elbows at z = 0 [rad/s^2], (..., n).   Eq. 15."""
+        if not self.elbows:
+            return q_ddot
+        unit = self._unit_torques(q)
+        rise = (q_ddot[..., None, :] @ unit)[..., 0, :] - (
+            np.cos(q @ self.to_pitch) * (q_dot @ self.to_pitch) ** 2
+        ) @ self._below
+        share = np.linalg.solve(np.swapaxes(unit, -1, -2) @ unit, rise[..., None])
+        return q_ddot - (unit @ share)[..., 0]
+
+    def _unit_torques(self, q: Array) -> Array:
+        """J_c^T [m/rad], (..., n, p): the torques of one newton under each elbow."""
+        return np.stack([self.elbow_torque(q, force) for force in np.eye(len(self.elbows))], axis=-1)
 
     def drive(self, q: ArrayLike, q_dot: ArrayLike, q_ddot: ArrayLike) -> Drive:
         """Currents of a motion that keeps the elbows down, with the elbow forces of least copper loss.
@@ -104,11 +123,9 @@ class InverseDynamics:
         """
         q = np.asarray(q, dtype=np.float64)
         torque = self.torque(q, np.asarray(q_dot, dtype=np.float64), np.asarray(q_ddot, dtype=np.float64))
-        forces = np.eye(len(self.elbows))
-        # (..., n, p): torque of a unit force on each elbow.
-        unit = np.stack([self.elbow_torque(q, force) for force in forces], axis=-1) if len(forces) else None
-        if unit is None:
+        if not self.elbows:
             return Drive(torque / self.torque_constant, np.zeros((*q.shape[:-1], 0)))
+        unit = self._unit_torques(q)
         price = (self.resistance / self.torque_constant**2)[:, None]
         gram = np.swapaxes(unit, -1, -2) @ (price * unit)
         force = np.linalg.solve(gram, np.swapaxes(unit, -1, -2) @ (price * torque[..., None]))
@@ -123,7 +140,7 @@ class InverseDynamics:
         )
 
     def held_voltage(self, q_dot: ArrayLike, current: ArrayLike, wanted: ArrayLike, period: float) -> Array:
-        """The constant voltage [V], (..., n), that takes `current` to `wanted` [A] in `period` seconds at fixed rates."""
+        """The constant voltage [V], (..., n), that takes `current` to `wanted` [A] in `period` [s] at fixed rates."""
         kept = np.exp(-self.resistance * period / self.inductance)
         final = (np.asarray(wanted) - kept * np.asarray(current)) / (1.0 - kept)
         return self.voltage(q_dot, final)
