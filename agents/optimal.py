@@ -147,7 +147,7 @@ def solve(
     guess: Trajectory,
     smoothings: Sequence[float] = SMOOTHINGS,
     progress: Progress = lambda _: None,
-    max_iter: int = 120,
+    max_iter: int = 100,
 ) -> Solution:
     """IPOPT at one smoothing after the other; a smaller one that fails leaves the solution of the one before.
 
@@ -234,8 +234,8 @@ def optimum(
         refine: whether the mesh is refined; if not, the simulator's verdict alone is the check.
 
     Raises:
-        SolveError: no guess converged, refining changed the cost by more than `REFINEMENT`, or the simulator's cost under
-            the LQR is not within `REPLAY` of the predicted one.
+        SolveError: no guess converged, refining changed the cost by more than `REFINEMENT`, or the simulator's cost
+            under the LQR is not within `REPLAY` of the predicted one.
     """
     started = time.monotonic()
     name, coarse = best_solution(problem, guesses, progress)

@@ -19,6 +19,7 @@ from agents.metrics import REGIMES, UNITS, Regime
 from agents.policy import SHIPPED
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES, ELBOW_NAMES, pyplot
 from agents.trajectory import Trajectory
+from benchmarks import breakdown, pareto
 from benchmarks.context import machine, versions
 from benchmarks.optimal import RESULTS, Cell, cached, files
 from benchmarks.statistics import Estimate, interquartile_mean
@@ -174,8 +175,19 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     plt.close(fig)
 
 
+def marks(rows: Sequence[Row]) -> list[pareto.Mark]:
+    """Every controller's place beside the front, in regime A."""
+    places = []
+    for row in rows:
+        if row.regime == "A":
+            energy = row.figures["electrical_energy"].value
+            error = row.figures["error_mean"].value
+            places.append(pareto.Mark(row.controller, row.elbows, error, energy))
+    return places
+
+
 def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path) -> None:
-    """Writes energy.csv, energy.json, energy.md and energy.png, each whole or not at all."""
+    """Writes energy.csv, .json, .md and .png, pareto.png, and breakdown.csv and .md of the paper's PD, each whole."""
     header = ["controller", "elbows", "regime"]
     header += [f"{name} [{unit}]{part}" for name, unit in UNITS.items() for part in ("", " low", " high")]
     joints = max(len(row.joint_energy) for row in rows)
@@ -200,6 +212,11 @@ def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path
     write_text(folder / "energy.json", json.dumps(context, indent=2) + "\n")
     write_text(folder / "energy.md", markdown(rows))
     write_whole(folder / "energy.png", lambda temporary: figure(rows, temporary))
+    write_whole(folder / "pareto.png", lambda temporary: pareto.figure(marks(rows), temporary))
+    papers = {(row.elbows, row.regime): row.joint_energy for row in rows if row.controller == "pd_paper"}
+    if papers:
+        counts = list(dict.fromkeys(elbows for elbows, _ in papers))
+        breakdown.save(breakdown.breakdown(lambda elbows, regime: papers[elbows, regime], counts), folder)
 
 
 def energy(output: Path = RESULTS, episodes: int = len(BENCHMARK_SEEDS)) -> list[Row]:
@@ -221,5 +238,5 @@ def energy(output: Path = RESULTS, episodes: int = len(BENCHMARK_SEEDS)) -> list
     console = Console(width=max(Console().width, 110))
     console.print(table(rows))
     console.print("Regimes: " + "; ".join(f"{regime.name} = {regime.meaning}" for regime in REGIMES))
-    console.print(f"Written: {output / 'energy.csv'}, energy.json, energy.md, energy.png")
+    console.print(f"Written: {output / 'energy.csv'}, energy.json, .md, .png, pareto.png, breakdown.csv, .md")
     return rows
