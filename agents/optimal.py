@@ -57,17 +57,11 @@ class SolveError(ArithmeticError):
 
 @dataclass(frozen=True)
 class Solution:
-    """A local minimum of the program."""
+    """A local minimum of the program, at the smallest smoothing that converged."""
 
     trajectory: Trajectory
     cost: float
     """Negative return without smoothing."""
-    energy: float
-    """Electrical energy [J], signed."""
-    degree: int
-    smoothing: float
-    """Smallest smoothing that was solved [m]."""
-    iterations: int
 
 
 @dataclass(frozen=True)
@@ -103,19 +97,15 @@ class Optimum:
         return {name: value for name, value in asdict(self).items() if name != "trajectory"}
 
 
-def posture_guesses(problem: Problem, count: int = 1, seed: int = 0) -> dict[str, Trajectory]:
-    """Smooth motions from the start to the paper's posture and to the best postures at rest, by name."""
+def posture_guesses(problem: Problem) -> dict[str, Trajectory]:
+    """Smooth motions from the start to the paper's posture and to the best posture at rest, by name."""
     settings = problem.settings
     arm, circle, elbows = settings.parsed_arm, settings.parsed_circle, settings.elbow_joints
-    postures = best_postures(arm, elbows, circle, problem.above_table, seed=seed)
-    distinct = [postures[0]]
-    for posture in postures[1:]:
-        if all(np.abs(posture.pose - other.pose).max() > 0.1 for other in distinct):
-            distinct.append(posture)
-    poses = {"paper posture": np.array(arm.nominal_pose)}
-    poses.update({f"posture of {p.copper_loss:.1f} W": p.pose for p in distinct[:count]})
-    angle = circle.angle(settings.control_period * np.arange(settings.horizon + 1), float(circle.phase))
-    grown, rate, _ = minimum_jerk(settings.control_period * np.arange(settings.horizon + 1) / REACH_TIME)
+    best = best_postures(arm, elbows, circle, problem.above_table)[0]
+    poses = {"paper posture": np.array(arm.nominal_pose), f"posture of {best.copper_loss:.1f} W": best.pose}
+    instants = settings.control_period * np.arange(settings.horizon + 1)
+    angle = circle.angle(instants, float(circle.phase))
+    grown, rate, _ = minimum_jerk(instants / REACH_TIME)
     guesses = {}
     for name, pose in poses.items():
         q_d, q_d_dot = inverse_kinematics(arm, pose, circle.position(angle), circle.velocity(angle))
@@ -154,27 +144,24 @@ def solve(
     Raises:
         SolveError: the first smoothing did not converge.
     """
-    x, multipliers, reached, iterations = variables(program, guess), None, 0.0, 0
+    x, multipliers = variables(program, guess), None
     # A guess that the simulator made is nearly feasible: the barrier need not push it away from its bounds first.
     near = {"mu_init": 1e-3, "bound_push": 1e-4, "bound_frac": 1e-4} if guess.voltage.any() else {}
     for smoothing in smoothings:
         found, after, stats = program.solve(x, smoothing, multipliers, max_iter=max_iter, **ACCEPTABLE, **near)
         near = {}
-        iterations += int(stats["iter_count"])
         status = str(stats["return_status"])
         progress(f"smoothing {smoothing * 1e3:g} mm, {stats['iter_count']} iterations: {status}")
         if status not in SOLVED:
-            if reached == 0.0:
+            if multipliers is None:
                 raise SolveError(f"IPOPT must converge at a smoothing of {smoothing} m, got {status}")
             break
-        x, multipliers, reached = found, after, smoothing
+        x, multipliers = found, after
     parts, voltage = program.split(x)
     states = {name: parts[name][:, -1] for name in ("q", "q_dot", "current")}
     start = {"q": program.problem.start, "q_dot": np.zeros(program.n), "current": np.zeros(program.n)}
     whole = {name: np.concatenate([start[name][None], value]) for name, value in states.items()}
-    return Solution(
-        Trajectory(**whole, voltage=voltage), program.cost(x), program.energy(x), program.degree, reached, iterations
-    )
+    return Solution(Trajectory(**whole, voltage=voltage), program.cost(x))
 
 
 def simulated(problem: Problem, trajectory: Trajectory) -> tuple[Trajectory, Recording]:

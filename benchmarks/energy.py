@@ -45,7 +45,10 @@ class Row:
 def cells() -> list[tuple[str, int]]:
     """Controller and elbow count of every comparison: the classical ones, and what a file is there for."""
     classical = [("pd_24v" if name == "pd" else name, elbows) for name in CLASSICAL for elbows in ELBOW_COUNTS]
-    planned = [("lqr", elbows) for elbows in ELBOW_COUNTS if files(Cell(elbows))[1].is_file()]
+    starts = {regime.start for regime in REGIMES}
+    planned = [
+        ("lqr", elbows) for elbows in ELBOW_COUNTS if all(files(Cell(elbows, start))[1].is_file() for start in starts)
+    ]
     learned = [(name, elbows) for name in ("ppo", "sac") for elbows in ELBOW_COUNTS]
     learned = [(name, elbows) for name, elbows in learned if (SHIPPED / f"{name}_elbows{elbows}.json").is_file()]
     return classical + planned + learned

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -153,7 +154,13 @@ def run_cells(todo: Sequence[Cell], results: Path, workers: int) -> dict[str, st
 
 
 def optimal(output: Path, fresh: bool, workers: int, front: bool) -> None:
-    """Solves what is not there yet, writes optimal.csv and says what failed."""
+    """Solves what is not there yet, writes optimal.csv and says what failed.
+
+    Raises:
+        ValueError: CasADi is not installed.
+    """
+    if find_spec("casadi") is None:
+        raise ValueError('casadi must be installed to solve, got none: pip install -e ".[optimal]"')
     started = time.monotonic()
     todo = [cell for cell in cells(front) if fresh or cached(cell, output) is None]
     failures = run_cells(todo, output, workers)
