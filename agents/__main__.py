@@ -79,7 +79,8 @@ def evaluate(policy: tyro.conf.Positional[str], /, elbows: int | None = None, ep
     """Plays a controller in the regimes A, B and C and prints what it cost.
 
     Args:
-        policy: "pd", "pd_paper", the algorithm of a shipped policy ("ppo"), or the path of a policy.
+        policy: "pd", "pd_paper", "pd_smooth", "pd_gravity", "computed_torque", "computed_torque_posture", the algorithm
+            of a shipped policy ("ppo"), or the path of a policy.
         elbows: elbows on the table; the policy's own, or 2, when not given.
         episodes: start poses, one fixed seed each.
     """

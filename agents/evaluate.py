@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.classical import COMPUTED, ComputedTorque, GravityPD, SmoothPD, economical_computed_torque
 from agents.controller import Controller
 from agents.metrics import REGIMES, UNITS, joint_energies, metrics
 from agents.pd import CLIPPED, UNLIMITED, PDController
@@ -22,6 +24,16 @@ BENCHMARK_SEEDS = tuple(range(20_000, 20_020))
 
 RECORDING_PERIOD = 0.001
 """Fast controllers are recorded at this rate [s], slower ones at their own."""
+
+CLASSICAL: dict[str, tuple[dict[str, Any], Callable[[ElbowArmVectorEnv], Controller]]] = {
+    "pd_paper": (UNLIMITED, PDController),
+    "pd": (CLIPPED, PDController),
+    "pd_smooth": (CLIPPED, SmoothPD),
+    "pd_gravity": (CLIPPED, GravityPD),
+    "computed_torque": (COMPUTED, ComputedTorque),
+    "computed_torque_posture": (COMPUTED, economical_computed_torque),
+}
+"""Arguments of the environment and maker of each controller that needs neither training nor a trajectory."""
 
 Results = dict[str, dict[str, NDArray[np.float64]]]
 
@@ -52,14 +64,13 @@ def in_all_regimes(
 def named_controller(name: str, elbows: int | None) -> tuple[Settings, Callable[[ElbowArmVectorEnv], Controller]]:
     """The environment and the maker of a controller by its name.
 
-    Names: "pd" (the paper's, clipped to 24 V, read at 2 kHz), "pd_paper" (unlimited, 10 kHz), an algorithm whose policy
-    is shipped ("ppo"), or the path of a policy.
+    Names: those of `CLASSICAL` ("pd" is the paper's clipped to 24 V and read at 2 kHz, "pd_paper" unlimited at 10 kHz),
+    an algorithm whose policy is shipped ("ppo"), or the path of a policy.
     """
     count = 2 if elbows is None else elbows
-    if name == "pd_paper":
-        return Settings(elbows=count, **UNLIMITED), PDController
-    if name == "pd":
-        return Settings(elbows=count, **CLIPPED), PDController
+    if name in CLASSICAL:
+        arguments, make = CLASSICAL[name]
+        return Settings(elbows=count, **arguments), make
     is_path = pair(Path(name))[0].is_file()
     policy = load_policy(name) if is_path else load_policy(name, elbows=count)
     if elbows is not None and policy.settings.elbows != elbows:

@@ -39,6 +39,7 @@ UNITS = {
     "copper_loss": "J",
     "link_work": "J",
     "error_rms": "mm",
+    "error_mean": "mm",
     "error_max": "mm",
     "z_rms": "mm",
     "peak_voltage": "V",
@@ -70,6 +71,7 @@ def metrics(recording: Recording, since: float = 0.0) -> dict[str, Array]:
         "copper_loss": (recording.copper_loss[-1] - recording.copper_loss[k]).sum(axis=-1),
         "link_work": (recording.link_work[-1] - recording.link_work[k]).sum(axis=-1),
         "error_rms": 1e3 * np.sqrt((distance**2).mean(axis=0)),
+        "error_mean": 1e3 * _on_grid(recording, k)[1].mean(axis=0),
         "error_max": 1e3 * distance.max(axis=0),
         "z_rms": 1e3 * np.sqrt((error[..., 2] ** 2).mean(axis=0)),
         "peak_voltage": np.abs(recording.voltage[k + 1 :]).max(axis=(0, 2)),
@@ -86,10 +88,15 @@ def _first(recording: Recording, since: float) -> int:
     return int(np.searchsorted(recording.time, since - 1e-9))
 
 
-def _return(recording: Recording, k: int) -> Array:
+def _on_grid(recording: Recording, k: int) -> tuple[NDArray[np.int64], Array]:
+    """Indices of the return's instants from k on, and the tracking error [m] at all but the first."""
     stride = max(1, round(RETURN_PERIOD / recording.time[1]))
     grid = np.arange(k, recording.time.size, stride)
-    error = np.linalg.norm(recording.hand[grid[1:]] - recording.target[grid[1:]], axis=-1)
+    return grid, np.linalg.norm(recording.hand[grid[1:]] - recording.target[grid[1:]], axis=-1)
+
+
+def _return(recording: Recording, k: int) -> Array:
+    grid, error = _on_grid(recording, k)
     meter = recording.electrical_energy if recording.settings.regeneration else recording.drawn_energy
     energy = meter.sum(axis=-1)[grid[-1]] - meter.sum(axis=-1)[grid[0]]
     settings = recording.settings

@@ -26,6 +26,8 @@ class Recording:
     """[s], (T + 1,)."""
     q: Array
     """Relative joint angles [rad], (T + 1, B, n)."""
+    q_dot: Array
+    """[rad/s], (T + 1, B, n)."""
     hand: Array
     """[m], (T + 1, B, 3)."""
     target: Array
@@ -81,6 +83,7 @@ def record(
         simulator = episodes.simulator
         values = {
             "q": simulator.q,
+            "q_dot": simulator.q_dot,
             "hand": simulator.hand_position,
             "target": episodes.target(),
             "electrical_energy": simulator.electrical_energy,

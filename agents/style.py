@@ -8,8 +8,39 @@ DPI = 160
 TARGET_COLOUR = "#000000"
 ELBOW_COLOURS = {2: "#0072B2", 1: "#E69F00", 0: "#D55E00"}
 ELBOW_NAMES = {2: "two elbows", 1: "one elbow", 0: "no elbow"}
-CONTROLLER_COLOURS = {"pd_paper": "#D55E00", "pd_24v": "#E69F00", "ppo": "#0072B2", "sac": "#009E73"}
-CONTROLLER_NAMES = {"pd_paper": "PD, no limit", "pd_24v": "PD, 24 V", "ppo": "PPO, 24 V", "sac": "SAC, 24 V"}
+CONTROLLER_COLOURS = {
+    "pd_paper": "#D55E00",
+    "pd_24v": "#E69F00",
+    "pd_smooth": "#F0E442",
+    "pd_gravity": "#CC79A7",
+    "computed_torque": "#56B4E9",
+    "computed_torque_posture": "#666666",
+    "lqr": "#000000",
+    "ppo": "#0072B2",
+    "sac": "#009E73",
+}
+CONTROLLER_NAMES = {
+    "pd_paper": "PD, no limit",
+    "pd_24v": "PD, 24 V",
+    "pd_smooth": "PD, smooth start",
+    "pd_gravity": "PD + gravity",
+    "computed_torque": "computed torque",
+    "computed_torque_posture": "computed torque, posture",
+    "lqr": "LQR on the optimum",
+    "ppo": "PPO, 24 V",
+    "sac": "SAC, 24 V",
+}
+CONTROLLER_MARKERS = {
+    "pd_paper": "v",
+    "pd_24v": "^",
+    "pd_smooth": "s",
+    "pd_gravity": "D",
+    "computed_torque": "o",
+    "computed_torque_posture": "P",
+    "lqr": "*",
+    "ppo": "X",
+    "sac": "h",
+}
 
 
 def pyplot() -> Any:

@@ -1,4 +1,4 @@
-"""The command line: `python -m benchmarks energy` and `python -m benchmarks speed`."""
+"""The command line: `python -m benchmarks energy | optimal | speed`."""
 
 from __future__ import annotations
 
@@ -23,6 +23,21 @@ def energy(output: Path = RESULTS, episodes: int = 20) -> None:
     from benchmarks.energy import energy as measure_energy
 
     measure_energy(output, episodes)
+
+
+@app.command
+def optimal(output: Path = RESULTS, fresh: bool = False, workers: int = 2, front: bool = True) -> None:
+    """The best possible return for each elbow count, and the front of energy against tracking error.
+
+    Args:
+        output: folder for the results; what was solved there before is kept.
+        fresh: solve everything again.
+        workers: processes, one problem each.
+        front: also the energy weights beside the default one.
+    """
+    from benchmarks.optimal import optimal as solve_optimal
+
+    solve_optimal(output, fresh, workers, front)
 
 
 @app.command

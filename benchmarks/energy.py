@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import json
-import platform
 import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from agents.evaluate import BENCHMARK_SEEDS, in_all_regimes, named_controller
+from agents.controller import Controller
+from agents.evaluate import BENCHMARK_SEEDS, CLASSICAL, in_all_regimes, named_controller
 from agents.files import write_csv, write_text, write_whole
-from agents.metrics import REGIMES, UNITS
+from agents.lqr import TimeVaryingLQR
+from agents.metrics import REGIMES, UNITS, Regime
 from agents.policy import SHIPPED
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES, ELBOW_NAMES, pyplot
+from agents.trajectory import Trajectory
+from benchmarks import breakdown, pareto
+from benchmarks.context import machine, versions
+from benchmarks.optimal import RESULTS, Cell, cached, files
 from benchmarks.statistics import Estimate, interquartile_mean
+from elbow_gym.settings import Settings
+from elbow_gym.vector_env import ElbowArmVectorEnv
 
-RESULTS = Path(__file__).parent / "results"
 PACKAGES = ("elbow-gym", "gymnasium", "numpy", "numba", "scipy", "stable-baselines3", "torch")
 ELBOW_COUNTS = (2, 1, 0)
 
@@ -38,10 +43,39 @@ class Row:
 
 
 def cells() -> list[tuple[str, int]]:
-    """Controller and elbow count of every comparison: both PDs, and each shipped policy."""
-    pairs = [(name, elbows) for name in ("pd_paper", "pd_24v") for elbows in ELBOW_COUNTS]
+    """Controller and elbow count of every comparison: the classical ones, and what a file is there for."""
+    classical = [("pd_24v" if name == "pd" else name, elbows) for name in CLASSICAL for elbows in ELBOW_COUNTS]
+    starts = {regime.start for regime in REGIMES}
+    planned = [
+        ("lqr", elbows) for elbows in ELBOW_COUNTS if all(files(Cell(elbows, start))[1].is_file() for start in starts)
+    ]
     learned = [(name, elbows) for name in ("ppo", "sac") for elbows in ELBOW_COUNTS]
-    return pairs + [(name, elbows) for name, elbows in learned if (SHIPPED / f"{name}_elbows{elbows}.json").is_file()]
+    learned = [(name, elbows) for name, elbows in learned if (SHIPPED / f"{name}_elbows{elbows}.json").is_file()]
+    return classical + planned + learned
+
+
+def contender(name: str, elbows: int) -> tuple[Settings, Callable[[ElbowArmVectorEnv], Controller]]:
+    """The environment and the maker of a cell's controller."""
+    if name != "lqr":
+        return named_controller({"pd_24v": "pd"}.get(name, name), elbows)
+
+    def follow(env: ElbowArmVectorEnv) -> TimeVaryingLQR:
+        return TimeVaryingLQR(env, Trajectory.load(files(Cell(elbows, env.settings.start))[1]))
+
+    return Settings(elbows=elbows), follow
+
+
+def bound(elbows: int, regime: Regime) -> float | None:
+    """The best known negative return of a regime, from the start without noise; None where none was sought."""
+    figures = cached(Cell(elbows, regime.start)) if regime.since == 0.0 else None
+    return None if figures is None else float(figures["closed_loop"])
+
+
+def gap(row: Row) -> float | None:
+    """The optimality gap (J - J_opt) / |J_opt| with J = -return, or None where there is no bound."""
+    regime = next(regime for regime in REGIMES if regime.name == row.regime)
+    best = bound(row.elbows, regime)
+    return None if best is None else (-row.figures["return"].value - best) / abs(best)
 
 
 def measure(seeds: Sequence[int], progress: Callable[[str, int, int], None]) -> list[Row]:
@@ -49,7 +83,7 @@ def measure(seeds: Sequence[int], progress: Callable[[str, int, int], None]) -> 
     rows, everything = [], cells()
     for k, (name, elbows) in enumerate(everything):
         progress(f"{name}, {ELBOW_NAMES[elbows]}", k, len(everything))
-        settings, make = named_controller({"pd_24v": "pd"}.get(name, name), elbows)
+        settings, make = contender(name, elbows)
         results = in_all_regimes(settings, make, seeds)
         for regime in REGIMES:
             values = results[regime.name]
@@ -69,6 +103,7 @@ HEADER = (
     "rms (mm)",
     "z rms (mm)",
     "return",
+    "gap",
     "pull (N)",
     "below (s)",
 )
@@ -87,6 +122,7 @@ def shown(row: Row, estimate: Callable[[Estimate], str]) -> tuple[str, ...]:
         estimate(figures["error_rms"]),
         f"{figures['z_rms'].value:.3g}",
         f"{figures['return'].value:.4g}",
+        "" if (share := gap(row)) is None else f"{100.0 * share:.3g} %",
         # Only a negative force is a pull on the table.
         f"{force:.1f}" if force < 0.0 else "-",
         f"{figures['below_table'].value:.2f}",
@@ -142,16 +178,29 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     plt.close(fig)
 
 
+def marks(rows: Sequence[Row]) -> list[pareto.Mark]:
+    """Every controller's place beside the front, in regime A."""
+    places = []
+    for row in rows:
+        if row.regime == "A":
+            energy = row.figures["electrical_energy"].value
+            error = row.figures["error_mean"].value
+            places.append(pareto.Mark(row.controller, row.elbows, error, energy))
+    return places
+
+
 def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path) -> None:
-    """Writes energy.csv, energy.json, energy.md and energy.png, each whole or not at all."""
+    """Writes energy.csv, .json, .md and .png, pareto.png, and breakdown.csv and .md of the paper's PD, each whole."""
     header = ["controller", "elbows", "regime"]
     header += [f"{name} [{unit}]{part}" for name, unit in UNITS.items() for part in ("", " low", " high")]
     joints = max(len(row.joint_energy) for row in rows)
     header += [f"electrical_energy_joint_{k + 1} [J]" for k in range(joints)]
+    header.append("optimality_gap [-]")
     body = [
         [row.controller, row.elbows, row.regime]
         + [f"{value:.6g}" for name in UNITS for value in row.figures[name]]
         + [f"{value:.6g}" for value in row.joint_energy]
+        + ["" if (share := gap(row)) is None else f"{share:.6g}"]
         for row in rows
     ]
     write_csv(folder / "energy.csv", header, body)
@@ -160,29 +209,17 @@ def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path
         "made": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "seconds": round(seconds, 1),
         "seeds": list(seeds),
-        "machine": {"python": platform.python_version(), "system": platform.system(), "processor": processor()},
-        "versions": {name: found for name in PACKAGES if (found := _version(name))},
+        "machine": machine(),
+        "versions": versions(*PACKAGES),
     }
     write_text(folder / "energy.json", json.dumps(context, indent=2) + "\n")
     write_text(folder / "energy.md", markdown(rows))
     write_whole(folder / "energy.png", lambda temporary: figure(rows, temporary))
-
-
-def processor() -> str:
-    """The processor's name, as far as the system tells."""
-    info = Path("/proc/cpuinfo")
-    if info.is_file():
-        for line in info.read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    return platform.processor() or platform.machine()
-
-
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
+    write_whole(folder / "pareto.png", lambda temporary: pareto.figure(marks(rows), temporary))
+    papers = {(row.elbows, row.regime): row.joint_energy for row in rows if row.controller == "pd_paper"}
+    if papers:
+        counts = list(dict.fromkeys(elbows for elbows, _ in papers))
+        breakdown.save(breakdown.breakdown(lambda elbows, regime: papers[elbows, regime], counts), folder)
 
 
 def energy(output: Path = RESULTS, episodes: int = len(BENCHMARK_SEEDS)) -> list[Row]:
@@ -204,5 +241,5 @@ def energy(output: Path = RESULTS, episodes: int = len(BENCHMARK_SEEDS)) -> list
     console = Console(width=max(Console().width, 110))
     console.print(table(rows))
     console.print("Regimes: " + "; ".join(f"{regime.name} = {regime.meaning}" for regime in REGIMES))
-    console.print(f"Written: {output / 'energy.csv'}, energy.json, energy.md, energy.png")
+    console.print(f"Written: {output / 'energy.csv'}, energy.json, .md, .png, pareto.png, breakdown.csv, .md")
     return rows

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import datetime, timezone
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +24,8 @@ from benchmarks.contenders import (
     Sampler,
     own_contenders,
 )
-from benchmarks.energy import PACKAGES, RESULTS, processor
+from benchmarks.context import machine, versions
+from benchmarks.energy import PACKAGES, RESULTS
 from benchmarks.environments import START, environment_contenders
 from benchmarks.peers import C_LOOP, MUJOCO, check_agreement, peer_contenders
 
@@ -208,17 +207,6 @@ def table(rows: Sequence[Row]) -> Any:
     return body
 
 
-def versions() -> dict[str, str]:
-    """Versions of what takes part, of those packages that are installed."""
-    found = {}
-    for name in (*PACKAGES, "mujoco", "pin", "imageio"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
-
-
 def save(rows: Sequence[Row], context: dict[str, Any], folder: Path) -> None:
     """Writes speed.csv, speed.json, speed.md and speed.png, each whole or not at all."""
     from benchmarks.speed_figure import figure
@@ -267,13 +255,11 @@ def speed(output: Path = RESULTS, quick: bool = False) -> list[Row]:
         "made": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "seconds": round(time.monotonic() - started, 1),
         "machine": {
-            "python": platform.python_version(),
-            "system": platform.system(),
-            "processor": processor(),
+            **machine(),
             "cores": os.cpu_count(),
             "load_average_before": load,
         },
-        "versions": versions(),
+        "versions": versions(*PACKAGES, "mujoco", "pin", "imageio"),
         "rounds": rounds,
         "seconds_per_sample": QUICK_SECONDS if quick else SECONDS,
         "relative_difference_to_the_kernel": differences,

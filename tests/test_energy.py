@@ -36,7 +36,8 @@ def test_benchmark_writes_table_figure_and_context(tmp_path, monkeypatch, capsys
     monkeypatch.setattr(energy, "cells", lambda: [("pd_24v", 2), ("ppo", 2)])
     rows = energy.energy(tmp_path, episodes=2)
     assert [row.regime for row in rows] == ["A", "B", "C"] * 2
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["energy.csv", "energy.json", "energy.md", "energy.png"]
+    written_files = ["energy.csv", "energy.json", "energy.md", "energy.png", "pareto.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == written_files
     with (tmp_path / "energy.csv").open() as handle:
         written = list(csv.DictReader(handle))
     assert float(written[0]["electrical_energy [J]"]) == pytest.approx(
@@ -44,6 +45,20 @@ def test_benchmark_writes_table_figure_and_context(tmp_path, monkeypatch, capsys
     )
     assert json.loads((tmp_path / "energy.json").read_text())["seeds"] == [20_000, 20_001]
     assert "PD, 24 V" in capsys.readouterr().out
+
+
+def test_gap_is_the_excess_over_the_bound_where_there_is_one(monkeypatch):
+    monkeypatch.setattr(energy, "bound", lambda elbows, regime: 20.0 if regime.name == "A" else None)
+    figures = {"return": interquartile_mean([-30.0])}
+    assert energy.gap(energy.Row("pd_24v", 2, "A", figures, ())) == pytest.approx(0.5)
+    assert energy.gap(energy.Row("pd_24v", 2, "B", figures, ())) is None
+
+
+def test_lqr_stays_within_five_percent_of_the_bound_at_every_elbow_count():
+    gaps = {int(row["elbows"]): row for row in committed() if row["controller"] == "lqr" and row["regime"] == "A"}
+    assert sorted(gaps) == [0, 1, 2]
+    for row in gaps.values():
+        assert float(row["optimality_gap [-]"]) < 0.05
 
 
 def committed():

@@ -24,6 +24,7 @@ def hand_made(energy_weight=0.001):
         seeds=(0,),
         time=time,
         q=zeros,
+        q_dot=zeros,
         hand=hand,
         target=target,
         electrical_energy=energy,

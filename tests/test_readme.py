@@ -27,6 +27,12 @@ def test_energy_table_is_the_committed_one():
     assert table == (ROOT / "benchmarks/results/energy.md").read_text(encoding="utf-8")
 
 
+def test_breakdown_in_the_benchmarks_readme_is_the_committed_one():
+    page = (ROOT / "benchmarks/README.md").read_text(encoding="utf-8")
+    table = page.split("<!-- breakdown -->\n")[1].split("<!-- /breakdown -->")[0]
+    assert table == (ROOT / "benchmarks/results/breakdown.md").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("path", re.findall(r"!\[[^]]*\]\(([^)]+)\)|`((?:tests|benchmarks)/[\w./]+)`", README))
 def test_files_that_the_readme_names_exist(path):
     assert (ROOT / (path[0] or path[1])).exists()

@@ -158,6 +158,7 @@ def synthetic(elbows):
         (0,),
         time,
         q=zeros,
+        q_dot=zeros,
         hand=target - [0.0, 0.0, 0.01 * (1 + elbows)],
         target=target,
         electrical_energy=ramp * power,

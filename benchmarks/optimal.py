@@ -1,0 +1,173 @@
+"""`python -m benchmarks optimal`: the bound for each elbow count, and the front of energy against tracking error."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import sys
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from agents.files import write_csv, write_text
+from agents.optimal import Optimum, SolveError, optimum, posture_guesses
+from agents.trajectory import Trajectory
+from agents.transcription import Problem
+from benchmarks.context import machine, versions
+from elbow_gym.settings import Settings
+
+RESULTS = Path(__file__).parent / "results"
+FOLDER = "optimal"
+DEFAULT_WEIGHT = 0.001
+FRONT_WEIGHTS = (0.0002, 0.005)
+"""Energy weights of the front beside the default one [1/W]."""
+ELBOW_COUNTS = (2, 0, 1)
+MAKER = "python -m benchmarks optimal"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One problem of the benchmark."""
+
+    elbows: int
+    start: str = "paper"
+    energy_weight: float = DEFAULT_WEIGHT
+
+    @property
+    def name(self) -> str:
+        """Its files' name."""
+        target = "_on_target" if self.start == "on_target" else ""
+        weight = f"_weight{self.energy_weight:g}" if self.energy_weight != DEFAULT_WEIGHT else ""
+        return f"elbows{self.elbows}{target}{weight}"
+
+    @property
+    def problem(self) -> Problem:
+        """The default environment from a start without noise; with fewer than two elbows no joint under the table.
+
+        With two elbows the arm lies on the table all the same; with fewer, the space under it is worth much to the
+        reward and nothing to a user.
+        """
+        settings = Settings(elbows=self.elbows, start=self.start, energy_weight=self.energy_weight, start_noise=0.0)
+        return Problem(settings, above_table=self.elbows < 2)
+
+    @property
+    def question(self) -> dict[str, Any]:
+        """The problem in JSON types: a result is taken over only where this is the same."""
+        problem = self.problem
+        return json.loads(json.dumps({**problem.settings.arguments, "above_table": problem.above_table}))
+
+
+def cells(front: bool = True) -> list[Cell]:
+    """The default reward from both starts, then the front, which starts from its solutions."""
+    bounds = [Cell(elbows, start) for start in ("paper", "on_target") for elbows in ELBOW_COUNTS]
+    return bounds + [Cell(elbows, "paper", weight) for weight in FRONT_WEIGHTS for elbows in ELBOW_COUNTS if front]
+
+
+def files(cell: Cell, results: Path = RESULTS) -> tuple[Path, Path]:
+    """A cell's figures (JSON) and its trajectory (npz)."""
+    return results / FOLDER / f"{cell.name}.json", results / FOLDER / f"{cell.name}.npz"
+
+
+def cached(cell: Cell, results: Path = RESULTS) -> dict[str, Any] | None:
+    """The figures of an earlier run of the same problem, or None."""
+    card, trajectory = files(cell, results)
+    if not (card.is_file() and trajectory.is_file()):
+        return None
+    plain = json.loads(card.read_text(encoding="utf-8"))
+    return plain["figures"] if plain["problem"] == cell.question else None
+
+
+def solve_cell(cell: Cell, results: Path) -> str | None:
+    """Solves a cell and writes its files. Returns what went wrong, or None."""
+
+    def say(line: str) -> None:
+        print(f"  {cell.name}: {line}", file=sys.stderr, flush=True)
+
+    parent = files(Cell(cell.elbows), results)[1]
+    try:
+        if cell.energy_weight != DEFAULT_WEIGHT and parent.is_file():
+            guesses = {"default weight": Trajectory.load(parent)}
+        else:
+            guesses = posture_guesses(cell.problem)
+        # The front's cells have the default's mesh, which was refined there.
+        found = optimum(cell.problem, guesses, say, refine=cell.energy_weight == DEFAULT_WEIGHT)
+    except (SolveError, ValueError, ArithmeticError) as error:
+        return str(error)
+    save(cell, found, results)
+    return None
+
+
+def save(cell: Cell, found: Optimum, results: Path) -> None:
+    """Writes a cell's two files; the card last, so that a cell counts as done only when both are there."""
+    card, trajectory = files(cell, results)
+    found.trajectory.save(trajectory)
+    plain = {
+        "problem": cell.question,
+        "figures": found.figures,
+        "command": MAKER,
+        "made": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "machine": machine(),
+        "versions": versions("elbow-gym", "numpy", "scipy", "casadi"),
+    }
+    write_text(card, json.dumps(plain, indent=2) + "\n")
+
+
+def write_summary(results: Path, failures: dict[str, str]) -> None:
+    """Writes optimal.csv: one row a cell; a failed one has its reason and no numbers."""
+    names = [name for name in Optimum.__dataclass_fields__ if name != "trajectory"]
+    rows = []
+    for cell in cells():
+        figures = cached(cell, results)
+        status = "solved" if figures else failures.get(cell.name, "not run")
+        values = [figures[name] if figures else "" for name in names]
+        values = [f"{value:.6g}" if isinstance(value, float) else value for value in values]
+        rows.append([cell.elbows, cell.start, cell.energy_weight, cell.problem.above_table, status, *values])
+    write_csv(results / "optimal.csv", ["elbows", "start", "energy_weight", "above_table", "status", *names], rows)
+
+
+def run_cells(todo: Sequence[Cell], results: Path, workers: int) -> dict[str, str]:
+    """Solves cells in worker processes, with a bar; returns the failures' reasons by name."""
+    from tqdm import tqdm
+
+    failures: dict[str, str] = {}
+    context = multiprocessing.get_context("spawn")
+    with tqdm(total=len(todo), file=sys.stderr, unit="cell") as bar, ProcessPoolExecutor(workers, context) as pool:
+        # The front starts from the default weight's solutions, so it waits for them.
+        for stage in (True, False):
+            running = {
+                pool.submit(solve_cell, cell, results): cell
+                for cell in todo
+                if (cell.energy_weight == DEFAULT_WEIGHT) is stage
+            }
+            for future in as_completed(running):
+                reason = future.result()
+                if reason is not None:
+                    failures[running[future].name] = reason
+                bar.update()
+                bar.set_description(running[future].name)
+    return failures
+
+
+def optimal(output: Path, fresh: bool, workers: int, front: bool) -> None:
+    """Solves what is not there yet, writes optimal.csv and says what failed.
+
+    Raises:
+        ValueError: CasADi is not installed.
+    """
+    if find_spec("casadi") is None:
+        raise ValueError('casadi must be installed to solve, got none: pip install -e ".[optimal]"')
+    started = time.monotonic()
+    todo = [cell for cell in cells(front) if fresh or cached(cell, output) is None]
+    failures = run_cells(todo, output, workers)
+    write_summary(output, failures)
+    for name, reason in failures.items():
+        print(f"failed: {name}: {reason}")
+    minutes = (time.monotonic() - started) / 60.0
+    print(
+        f"{len(todo) - len(failures)} of {len(todo)} problems solved in {minutes:.1f} minutes: {output / 'optimal.csv'}"
+    )

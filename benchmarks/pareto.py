@@ -1,0 +1,60 @@
+"""The front of energy against tracking error, and where the controllers stand beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES, ELBOW_COLOURS, ELBOW_NAMES, pyplot
+from benchmarks.optimal import cached, cells
+
+
+class Mark(NamedTuple):
+    """A controller's place in the figure: mean tracking error [mm] and electrical energy [J] of regime A."""
+
+    controller: str
+    elbows: int
+    error: float
+    energy: float
+
+
+def front(elbows: int) -> list[tuple[float, float]]:
+    """Mean tracking error [mm] and energy [J] of the solved cells from the paper's pose, by falling energy."""
+    solved = [cached(cell) for cell in cells() if cell.elbows == elbows and cell.start == "paper"]
+    points = [(1e3 * figures["error_mean"], figures["energy"]) for figures in solved if figures]
+    return sorted(points)
+
+
+def figure(marks: Sequence[Mark], path: Path) -> None:
+    """One panel per elbow count: the front as a line, the controllers as marks, on logarithmic axes."""
+    plt = pyplot()
+    counts = sorted({mark.elbows for mark in marks}, reverse=True)
+    fig, axes = plt.subplots(1, len(counts), figsize=(10, 4.4), squeeze=False, layout="constrained")
+    for ax, elbows in zip(axes[0], counts, strict=True):
+        points = front(elbows)
+        if points:
+            ax.plot(*zip(*points, strict=True), "-", color=ELBOW_COLOURS[elbows], marker=".", label="optimal front")
+        for mark in (mark for mark in marks if mark.elbows == elbows):
+            ax.plot(
+                mark.error,
+                mark.energy,
+                CONTROLLER_MARKERS[mark.controller],
+                color=CONTROLLER_COLOURS[mark.controller],
+                markeredgecolor="black",
+                markeredgewidth=0.5,
+                markersize=9 if mark.controller == "lqr" else 7,
+                label=CONTROLLER_NAMES[mark.controller],
+            )
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+        ax.set_title(ELBOW_NAMES[elbows])
+        ax.set_xlabel("mean tracking error, 0-5 s (mm)")
+    axes[0, 0].set_ylabel("electrical energy, 0-5 s (J)")
+    named = {}
+    for ax in axes[0]:
+        handles, labels = ax.get_legend_handles_labels()
+        named.update(zip(labels, handles, strict=True))
+    fig.legend(named.values(), named.keys(), loc="outside upper center", ncols=5)
+    fig.savefig(path)
+    plt.close(fig)

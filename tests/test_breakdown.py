@@ -1,0 +1,34 @@
+"""Where the PD's energy goes: the parts are those of laws, and sum to the whole."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from agents.posture import static_copper_loss
+from benchmarks import breakdown
+from benchmarks.energy import RESULTS
+from elbow_gym.settings import Settings
+
+
+def test_parts_sum_to_the_whole_joint_by_joint():
+    joints = {"A": np.arange(10.0), "C": np.linspace(3.0, 5.0, 10)}
+    (share,) = breakdown.breakdown(lambda elbows, regime: joints[regime], [2])
+    np.testing.assert_allclose(share.start_step + share.sag + share.posture + share.least, joints["A"], atol=1e-9)
+
+
+@pytest.mark.parametrize("elbows", [0, 1, 2])
+def test_exact_motion_on_a_slow_circle_costs_the_static_copper_loss(arm, elbows):
+    circle = {"radius": 1e-3, "period": 1000.0}
+    settings = Settings(elbows=elbows, circle=circle)
+    q = breakdown.inverse_kinematics(arm, arm.nominal_pose, settings.parsed_circle.position(0.0))[0]
+    expected = static_copper_loss(arm, settings.elbow_joints, q) * settings.duration
+    assert breakdown.exact_energy(settings, arm.nominal_pose).sum() == pytest.approx(expected, rel=1e-3)
+
+
+def test_committed_table_sums_to_the_energy_of_the_benchmark():
+    with (RESULTS / "breakdown.csv").open() as handle:
+        rows = list(csv.DictReader(handle))
+    for elbows in ("0", "1", "2"):
+        sums = {row["part"]: float(row["sum [J]"]) for row in rows if row["elbows"] == elbows}
+        assert sum(sums[part] for part in breakdown.PARTS) == pytest.approx(sums["whole"], rel=1e-4)
