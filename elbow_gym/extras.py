@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,10 +89,9 @@ class Extras:
         noise = self._population.values["sensor_noise"]
         if not noise.any():
             return
-        noisy = layout.slices["target_angle"].start
+        noisy = int(layout.slices["target_angle"].start)
         for i in np.flatnonzero(noise > 0.0 if resting is None else (noise > 0.0) & ~resting):
-            clean = cast("NDArray[np.float32]", observation[i, :noisy])
-            heard = clean + float(noise[i]) * self._generators[int(i)].standard_normal(noisy)
+            heard = observation[i, :noisy] + float(noise[i]) * self._generators[int(i)].standard_normal(noisy)
             observation[i, :noisy] = np.clip(heard, -layout.high[:noisy], layout.high[:noisy])
 
     def _quantity(self, name: str) -> Array:
