@@ -5,14 +5,18 @@ import pytest
 from hypothesis import given, settings
 from strategies import cases
 
-from elbow_gym import dynamics
+from elbow_gym import Simulator, dynamics, kinematics
 
 mujoco = pytest.importorskip("mujoco")
 
 
-def mjcf(arm):
-    """Nested bodies with z along the link; armature is the reflected rotor inertia, damping all viscous friction."""
+def mjcf(arm, table=False):
+    """Nested bodies with z along the link; armature is the reflected rotor inertia, damping all viscous friction.
+
+    With a table, points (spheres of next to no radius) at joints 3..n and the hand touch a plane without friction.
+    """
     bodies = ""
+    point = '<geom size="1e-9" mass="0" condim="1" solref="-1e5 -200" contype="1" conaffinity="0" pos="0 0 {!r}"/>'
     for k, (link, motor) in enumerate(zip(arm.links, arm.motors, strict=True)):
         base = arm.links[k - 1].length if k else 0.0
         # Link 1 only yaws, so its inertia across is free; MuJoCo wants it safely above half of the one along.
@@ -22,12 +26,15 @@ def mjcf(arm):
             <body pos="0 0 {base!r}">
               <joint axis="{"0 1 0" if k else "0 0 1"}" armature="{motor.reflected_inertia!r}" damping="{damping!r}"/>
               <inertial pos="0 0 {link.length / 2.0!r}" mass="{link.mass!r}" diaginertia="
-                {across!r} {across!r} {link.axial_inertia!r}"/>"""
+                {across!r} {across!r} {link.axial_inertia!r}"/>
+              {point.format(link.length) if table and k else ""}"""
     return f"""
         <mujoco>
           <compiler angle="radian" boundmass="0" boundinertia="0"/>
           <option gravity="0 0 {-arm.gravity!r}"/>
-          <worldbody>{bodies}{"</body>" * arm.n_joints}</worldbody>
+          <worldbody>
+            {'<geom type="plane" size="9 9 1" contype="0" conaffinity="1" condim="1"/>' if table else ""}
+            {bodies}{"</body>" * arm.n_joints}</worldbody>
         </mujoco>"""
 
 
@@ -51,3 +58,28 @@ def test_matrix_bias_and_accelerations_are_mujocos(case):
         (q_ddot, data.qacc),
     ):
         np.testing.assert_allclose(value, expected, rtol=0.0, atol=1e-8 * max(1.0, np.abs(expected).max()))
+
+
+def test_an_arm_at_rest_on_the_table_is_borne_as_mujocos(arm):
+    # As many supports as pitch joints: statics alone fixes the forces, whatever law either contact follows. The
+    # motors' torques, of stalled currents v / R, load some points and relieve others.
+    voltage = 0.05 * np.random.default_rng(2).uniform(-1.0, 1.0, 10) * (np.arange(10) > 0)
+    flat = np.pi / 2.0 * np.eye(10)[1]
+    sim = Simulator(arm, 0, timestep=1e-3, table=True)
+    sim.reset(flat)
+    sim.step(voltage, 5000)
+    model = mujoco.MjModel.from_xml_string(mjcf(arm, table=True))
+    data = mujoco.MjData(model)
+    data.qpos[:] = flat
+    data.qfrc_applied[:] = arm.of_motors("joint_torque_constant") * voltage / arm.of_motors("armature_resistance")
+    for _ in range(3000):
+        mujoco.mj_step(model, data)
+    force, found = np.zeros(6), np.zeros(9)
+    for k in range(data.ncon):
+        mujoco.mj_contactForce(model, data, k, force)
+        found[data.contact[k].geom.max() - 1] += force[0]
+    # Both lie some tenths of a millimetre deep, over links of 0.3 m: cosines off by 1e-6.
+    np.testing.assert_allclose(sim.contact_force[0, :, 2], found, rtol=1e-5)
+    assert np.ptp(found[:-1]) > 0.1
+    assert found.sum() == pytest.approx(9.81 * 0.85, abs=0.3)
+    assert np.abs(kinematics.pitches(sim.q[0])[1:] - np.pi / 2.0).max() < 1e-3

@@ -4,11 +4,13 @@ import csv
 import json
 import sys
 import time
+from functools import partial
 
 import numpy as np
 import pytest
 
 from benchmarks import contenders, environments, peers, speed
+from elbow_gym import Simulator
 from elbow_gym.dynamics import forward_dynamics
 
 
@@ -66,6 +68,18 @@ def test_an_arm_in_a_batch_costs_a_third_of_a_single_one_at_most():
 def test_forty_joints_cost_six_times_ten_at_most():
     ten, forty = timings((OURS, "batch", STEP, 10, 2), (OURS, "batch", STEP, 40, 2))
     assert forty < 6.0 * ten
+
+
+@pytest.mark.parametrize("elbows", [0, 2])
+@pytest.mark.parametrize("num_envs", [1, 256])
+def test_the_table_costs_six_tenths_more_at_most(num_envs, elbows):
+    samplers = []
+    for table in (False, True):
+        sim = Simulator("paper", elbows, num_envs, timestep=1e-3, table=table)
+        volts = np.random.default_rng(0).uniform(-12.0, 12.0, (num_envs, 10))
+        samplers.append(contenders.timed(partial(sim.step, volts, 20), 20 * num_envs))
+    without, with_table = np.min([[sampler(0.02) for sampler in samplers] for _ in range(15)], axis=0)
+    assert with_table < 1.6 * without
 
 
 def test_kernel_is_fifty_times_faster_than_the_printed_form(benchmark):
