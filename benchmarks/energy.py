@@ -173,7 +173,7 @@ def figure(rows: Sequence[Row], path: Path) -> None:
             if column == 0:
                 ax.set_ylabel(label)
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside upper center", ncols=len(controllers))
+    fig.legend(handles, labels, loc="outside upper center", ncols=min(5, len(controllers)))
     fig.savefig(path)
     plt.close(fig)
 

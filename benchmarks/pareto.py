@@ -29,6 +29,8 @@ def front(elbows: int) -> list[tuple[float, float]]:
 def figure(marks: Sequence[Mark], path: Path) -> None:
     """One panel per elbow count: the front as a line, the controllers as marks, on logarithmic axes."""
     plt = pyplot()
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
     counts = sorted({mark.elbows for mark in marks}, reverse=True)
     fig, axes = plt.subplots(1, len(counts), figsize=(10, 4.4), squeeze=False, layout="constrained")
     for ax, elbows in zip(axes[0], counts, strict=True):
@@ -48,6 +50,10 @@ def figure(marks: Sequence[Mark], path: Path) -> None:
             )
         ax.set_xscale("log")
         ax.set_yscale("log")
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            axis.set_minor_formatter(NullFormatter())
         ax.set_title(ELBOW_NAMES[elbows])
         ax.set_xlabel("mean tracking error, 0-5 s (mm)")
     axes[0, 0].set_ylabel("electrical energy, 0-5 s (J)")
