@@ -59,7 +59,7 @@ class Reference:
 
     def __init__(self, env: Env, pose: ArrayLike | None, reach_time: float) -> None:
         episodes = env.unwrapped.episodes
-        self._arm, self._circle = episodes.arm, episodes.circle
+        self._arm, self._circle = episodes.arm, episodes.targets if episodes.circle.random else episodes.circle
         self._pose = episodes.pose if pose is None else np.asarray(pose, dtype=np.float64)
         self._period, self._reach_time = episodes.settings.control_period, positive("reach_time", reach_time)
         self._start: Array | None = None
@@ -72,7 +72,7 @@ class Reference:
         """The motion now, at the target's angle on the circle [rad], (...), with the arm at q [rad], (..., n)."""
         if self._start is None:
             self._start = q
-        rate = self._circle.rate
+        rate = np.asarray(self._circle.rate)[..., None]
         q_d, q_d_dot = self._desired(angle)
         q_d_ddot = (self._desired(angle + ANGLE_STEP)[1] - self._desired(angle - ANGLE_STEP)[1]) * (
             rate / (2.0 * ANGLE_STEP)
@@ -166,4 +166,4 @@ def economical_pose(arm: ArmParameters, elbows: tuple[int, ...], circle: Circle)
 def economical_computed_torque(env: Env) -> ComputedTorque:
     """`ComputedTorque` that moves to `economical_pose` first."""
     episodes = env.unwrapped.episodes
-    return ComputedTorque(env, economical_pose(episodes.arm, episodes.settings.elbow_joints, episodes.circle))
+    return ComputedTorque(env, economical_pose(episodes.arm, episodes.settings.elbow_joints, episodes.circle.middle))

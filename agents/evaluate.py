@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from agents.classical import COMPUTED, ComputedTorque, GravityPD, SmoothPD, economical_computed_torque
 from agents.controller import Controller
-from agents.metrics import REGIMES, UNITS, joint_energies, metrics
+from agents.metrics import REGIMES, UNITS, Regime, joint_energies, metrics
 from agents.pd import CLIPPED, UNLIMITED, PDController
 from agents.policy import Policy, load_policy, pair
 from agents.recording import record
@@ -21,6 +21,14 @@ from elbow_gym.vector_env import ElbowArmVectorEnv
 
 BENCHMARK_SEEDS = tuple(range(20_000, 20_020))
 """Fixed and public; no training and no choice of a policy uses them."""
+
+SHIFTED: dict[str, Any] = {
+    "start_noise": 0.04,
+    "circle": {"radius": [0.05, 0.1], "period": [3.5, 7.0], "phase": "random"},
+    "randomize": {"payload": [0.05, 0.2]},
+}
+"""What the shifted set changes in an environment. No training and no tuning has used it; controllers are told the
+circle and not the payload. Larger circles are out of the paper PD's reach."""
 
 RECORDING_PERIOD = 0.001
 """Fast controllers are recorded at this rate [s], slower ones at their own."""
@@ -43,6 +51,7 @@ def in_all_regimes(
     make_controller: Callable[[ElbowArmVectorEnv], Controller],
     seeds: Sequence[int] = BENCHMARK_SEEDS,
     progress: Callable[[int, int], None] | None = None,
+    regimes: Sequence[Regime] = REGIMES,
 ) -> Results:
     """Metrics of every episode (S,) by regime and name; `joint_energy` beside them is (S, n).
 
@@ -50,7 +59,7 @@ def in_all_regimes(
     """
     results: Results = {}
     recordings = {}
-    for regime in REGIMES:
+    for regime in regimes:
         if regime.start not in recordings:
             started = replace(settings, start=regime.start)
             every = max(1, round(settings.control_frequency * RECORDING_PERIOD))

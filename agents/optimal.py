@@ -30,6 +30,8 @@ SMOOTHINGS = (0.03, 0.003, 0.001)
 ROUGH_SMOOTHINGS = (0.3, 0.03)
 ROUGH_ITERATIONS = 60
 """The same with one point in a period, and the most iterations spent on it."""
+PATIENT_ITERATIONS = 250
+"""The most iterations of a fine solve that a shorter one has failed."""
 REACH_TIME = 1.0
 """A guess goes from the start to its posture in this time [s]."""
 COARSE, FINE = 2, 3
@@ -209,6 +211,22 @@ def best_solution(problem: Problem, guesses: dict[str, Trajectory], progress: Pr
     return best, found[best]
 
 
+def refined(problem: Problem, guess: Trajectory, progress: Progress) -> Solution:
+    """The solution on the fine mesh, from the coarse one as the simulator plays it.
+
+    Mostly its last smoothings are enough; where the first of them does not converge, all are taken.
+
+    Raises:
+        SolveError: neither way converged.
+    """
+    program = Transcription(problem, FINE)
+    try:
+        return solve(program, guess, SMOOTHINGS[1:], progress)
+    except SolveError as error:
+        progress(str(error))
+        return solve(program, guess, SMOOTHINGS, progress, PATIENT_ITERATIONS)
+
+
 def optimum(
     problem: Problem, guesses: dict[str, Trajectory], progress: Progress = lambda _: None, refine: bool = True
 ) -> Optimum:
@@ -228,8 +246,7 @@ def optimum(
     name, coarse = best_solution(problem, guesses, progress)
     fine = coarse
     if refine:
-        again, _ = simulated(problem, coarse.trajectory)
-        fine = solve(Transcription(problem, FINE), again, SMOOTHINGS[1:], progress)
+        fine = refined(problem, simulated(problem, coarse.trajectory)[0], progress)
     if abs(fine.cost - coarse.cost) > REFINEMENT * abs(fine.cost):
         raise SolveError(
             f"refining must change the cost by at most {REFINEMENT:.1%}, got {coarse.cost:.5g} -> {fine.cost:.5g}"

@@ -42,13 +42,18 @@ class PDController:
     def __init__(self, env: ElbowArmEnv | ElbowArmVectorEnv, kp: float = PAPER_KP, kd: float = PAPER_KD) -> None:
         self.kp, self.kd = positive("kp", kp), positive("kd", kd)
         episodes = env.unwrapped.episodes
-        self._layout, self._circle = episodes.layout, episodes.circle
+        # A drawn circle is another one in each episode.
+        self._layout, self._circle = episodes.layout, episodes.targets if episodes.circle.random else episodes.circle
         self._arm, self._pose = episodes.arm, episodes.pose
         self._volts, self._highest = episodes.volts_per_action, episodes.highest_action
-        self.desired(np.linspace(0.0, 2.0 * np.pi, 73))
+        if not episodes.circle.random:
+            self.desired(np.linspace(0.0, 2.0 * np.pi, 73))
 
     def desired(self, angle: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """q_d [rad] and q_d_dot [rad/s], each (..., n), for the target's angle on the circle [rad], (...)."""
+        """q_d [rad] and q_d_dot [rad/s], each (..., n), for the target's angle on the circle [rad], (...).
+
+        Where circles are drawn, one angle per arm, (B,).
+        """
         position, velocity = self._circle.position(angle), self._circle.velocity(angle)
         return inverse_kinematics(self._arm, self._pose, position, velocity)
 

@@ -6,13 +6,13 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 from agents.controller import Controller
-from agents.evaluate import BENCHMARK_SEEDS, CLASSICAL, in_all_regimes, named_controller
+from agents.evaluate import BENCHMARK_SEEDS, CLASSICAL, SHIFTED, in_all_regimes, named_controller
 from agents.files import write_csv, write_text, write_whole
 from agents.lqr import TimeVaryingLQR
 from agents.metrics import REGIMES, UNITS, Regime
@@ -40,6 +40,8 @@ class Row:
     figures: dict[str, Estimate]
     joint_energy: tuple[float, ...]
     """Interquartile mean of each joint's signed electrical energy [J]."""
+    shifted: bool = False
+    """Whether it is of the shifted set, for which no bound was sought."""
 
 
 def cells() -> list[tuple[str, int]]:
@@ -74,23 +76,32 @@ def bound(elbows: int, regime: Regime) -> float | None:
 def gap(row: Row) -> float | None:
     """The optimality gap (J - J_opt) / |J_opt| with J = -return, or None where there is no bound."""
     regime = next(regime for regime in REGIMES if regime.name == row.regime)
-    best = bound(row.elbows, regime)
+    best = None if row.shifted else bound(row.elbows, regime)
     return None if best is None else (-row.figures["return"].value - best) / abs(best)
 
 
-def measure(seeds: Sequence[int], progress: Callable[[str, int, int], None]) -> list[Row]:
-    """Runs all cells; `progress` gets a cell's name, the cells done and their number."""
-    rows, everything = [], cells()
-    for k, (name, elbows) in enumerate(everything):
-        progress(f"{name}, {ELBOW_NAMES[elbows]}", k, len(everything))
+def shifted_cells() -> list[tuple[str, int]]:
+    """The cells that also play the shifted set: not the LQR, whose trajectory is of one circle, nor the 10 kHz PD."""
+    return [(name, elbows) for name, elbows in cells() if name not in ("lqr", "pd_paper")]
+
+
+def measure(seeds: Sequence[int], progress: Callable[[str, int], None]) -> list[Row]:
+    """Runs all cells on the nominal set, then on the shifted one; `progress` gets a cell's name and the cells done."""
+    rows: list[Row] = []
+    everything = [(cell, False) for cell in cells()] + [(cell, True) for cell in shifted_cells()]
+    for k, ((name, elbows), shifted) in enumerate(everything):
+        progress(f"{name}, {ELBOW_NAMES[elbows]}{', shifted' if shifted else ''}", k)
         settings, make = contender(name, elbows)
-        results = in_all_regimes(settings, make, seeds)
-        for regime in REGIMES:
+        if shifted:
+            settings = replace(settings, **SHIFTED)
+        regimes = [regime for regime in REGIMES if not shifted or regime.start == "paper"]
+        results = in_all_regimes(settings, make, seeds, regimes=regimes)
+        for regime in regimes:
             values = results[regime.name]
             figures = {metric: interquartile_mean(values[metric]) for metric in UNITS}
             joints = tuple(interquartile_mean(column).value for column in values["joint_energy"].T)
-            rows.append(Row(name, elbows, regime.name, figures, joints))
-    progress("done", len(everything), len(everything))
+            rows.append(Row(name, elbows, regime.name, figures, joints, shifted))
+    progress("done", len(everything))
     return rows
 
 
@@ -136,15 +147,16 @@ def markdown(rows: Sequence[Row]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def table(rows: Sequence[Row]) -> Any:
+def table(rows: Sequence[Row], title: str) -> Any:
     """The same for the terminal, without the intervals."""
     from rich.table import Table
 
-    body = Table(title="Interquartile means over the evaluation episodes")
+    body = Table(title=f"{title}: interquartile means over the evaluation episodes")
     for name in HEADER:
         body.add_column(name, justify="left" if name == "controller" else "right", no_wrap=name == "controller")
-    for k, row in enumerate(rows):
-        body.add_row(*shown(row, lambda e: f"{e.value:.4g}"), end_section=k % len(REGIMES) == len(REGIMES) - 1)
+    for row, after in zip(rows, [*rows[1:], None], strict=True):
+        last = after is None or (row.controller, row.elbows) != (after.controller, after.elbows)
+        body.add_row(*shown(row, lambda e: f"{e.value:.4g}"), end_section=last)
     return body
 
 
@@ -190,7 +202,41 @@ def marks(rows: Sequence[Row]) -> list[pareto.Mark]:
 
 
 def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path) -> None:
-    """Writes energy.csv, .json, .md and .png, pareto.png, and breakdown.csv and .md of the paper's PD, each whole."""
+    """Writes energy.csv, .json, .md and .png, pareto.png, and breakdown.csv and .md of the paper's PD, each whole.
+
+    The shifted set's rows stand in energy_shifted.csv and .md.
+    """
+    nominal, shifted = split(rows)
+    _write_rows(nominal, folder / "energy.csv")
+    _write_rows(shifted, folder / "energy_shifted.csv")
+    context = {
+        "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
+        "made": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "seconds": round(seconds, 1),
+        "seeds": list(seeds),
+        "shifted": SHIFTED,
+        "machine": machine(),
+        "versions": versions(*PACKAGES),
+    }
+    write_text(folder / "energy.json", json.dumps(context, indent=2) + "\n")
+    write_text(folder / "energy.md", markdown(nominal))
+    write_text(folder / "energy_shifted.md", markdown(shifted))
+    write_whole(folder / "energy.png", lambda temporary: figure(nominal, temporary))
+    write_whole(folder / "pareto.png", lambda temporary: pareto.figure(marks(nominal), temporary))
+    papers = {(row.elbows, row.regime): row.joint_energy for row in nominal if row.controller == "pd_paper"}
+    if papers:
+        counts = list(dict.fromkeys(elbows for elbows, _ in papers))
+        breakdown.save(breakdown.breakdown(lambda elbows, regime: papers[elbows, regime], counts), folder)
+
+
+def split(rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
+    """Rows of the nominal and of the shifted set."""
+    return [row for row in rows if not row.shifted], [row for row in rows if row.shifted]
+
+
+def _write_rows(rows: Sequence[Row], path: Path) -> None:
+    if not rows:
+        return
     header = ["controller", "elbows", "regime"]
     header += [f"{name} [{unit}]{part}" for name, unit in UNITS.items() for part in ("", " low", " high")]
     joints = max(len(row.joint_energy) for row in rows)
@@ -203,23 +249,7 @@ def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path
         + ["" if (share := gap(row)) is None else f"{share:.6g}"]
         for row in rows
     ]
-    write_csv(folder / "energy.csv", header, body)
-    context = {
-        "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
-        "made": datetime.now(timezone.utc).isoformat(timespec="seconds"),
-        "seconds": round(seconds, 1),
-        "seeds": list(seeds),
-        "machine": machine(),
-        "versions": versions(*PACKAGES),
-    }
-    write_text(folder / "energy.json", json.dumps(context, indent=2) + "\n")
-    write_text(folder / "energy.md", markdown(rows))
-    write_whole(folder / "energy.png", lambda temporary: figure(rows, temporary))
-    write_whole(folder / "pareto.png", lambda temporary: pareto.figure(marks(rows), temporary))
-    papers = {(row.elbows, row.regime): row.joint_energy for row in rows if row.controller == "pd_paper"}
-    if papers:
-        counts = list(dict.fromkeys(elbows for elbows, _ in papers))
-        breakdown.save(breakdown.breakdown(lambda elbows, regime: papers[elbows, regime], counts), folder)
+    write_csv(path, header, body)
 
 
 def energy(output: Path = RESULTS, episodes: int = len(BENCHMARK_SEEDS)) -> list[Row]:
@@ -229,9 +259,9 @@ def energy(output: Path = RESULTS, episodes: int = len(BENCHMARK_SEEDS)) -> list
 
     seeds = [BENCHMARK_SEEDS[0] + k for k in range(episodes)]
     started = time.monotonic()
-    with tqdm(total=len(cells()), file=sys.stderr, unit="controller") as bar:
+    with tqdm(total=len(cells()) + len(shifted_cells()), file=sys.stderr, unit="controller") as bar:
 
-        def progress(name: str, done: int, _: int) -> None:
+        def progress(name: str, done: int) -> None:
             bar.set_description(name)
             bar.update(done - bar.n)
 
@@ -239,7 +269,10 @@ def energy(output: Path = RESULTS, episodes: int = len(BENCHMARK_SEEDS)) -> list
     save(rows, seeds, time.monotonic() - started, output)
     # Wider than a pipe's 80 columns, which would cut the figures.
     console = Console(width=max(Console().width, 110))
-    console.print(table(rows))
+    nominal, shifted = split(rows)
+    console.print(table(nominal, "Nominal set"))
+    if shifted:
+        console.print(table(shifted, "Shifted set"))
     console.print("Regimes: " + "; ".join(f"{regime.name} = {regime.meaning}" for regime in REGIMES))
-    console.print(f"Written: {output / 'energy.csv'}, energy.json, .md, .png, pareto.png, breakdown.csv, .md")
+    console.print(f"Written to {output}: energy.*, energy_shifted.*, pareto.png, breakdown.*")
     return rows

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
 import sys
 import time
 from collections.abc import Sequence
@@ -24,7 +25,7 @@ from elbow_gym.settings import Settings
 RESULTS = Path(__file__).parent / "results"
 FOLDER = "optimal"
 DEFAULT_WEIGHT = 0.001
-FRONT_WEIGHTS = (0.0002, 0.005)
+FRONT_WEIGHTS = (0.0002, 0.002, 0.005)
 """Energy weights of the front beside the default one [1/W]."""
 ELBOW_COUNTS = (2, 0, 1)
 MAKER = "python -m benchmarks optimal"
@@ -136,6 +137,9 @@ def run_cells(todo: Sequence[Cell], results: Path, workers: int) -> dict[str, st
 
     failures: dict[str, str] = {}
     context = multiprocessing.get_context("spawn")
+    # Small dense algebra: threads of two workers' BLAS would only get in each other's way.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     with tqdm(total=len(todo), file=sys.stderr, unit="cell") as bar, ProcessPoolExecutor(workers, context) as pool:
         # The front starts from the default weight's solutions, so it waits for them.
         for stage in (True, False):

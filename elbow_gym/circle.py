@@ -123,6 +123,14 @@ class Circle:
         return replace(self, **values) if values else self
 
     @property
+    def middle(self) -> Circle:
+        """The circle in the middle of the ranges, in the first plane, counterclockwise from angle zero."""
+        choices = {"plane": self.planes[0], "direction": DIRECTIONS[0], "phase": 0.0}
+        means = {"center": tuple(float(np.mean(ends(x))) for x in self.center)}
+        means |= {name: float(np.mean(ends(getattr(self, name)))) for name in ("radius", "period")}
+        return replace(self, **{name: {**choices, **means}[name] for name in self.drawn})
+
+    @property
     def planes(self) -> tuple[str, ...]:
         """The planes that the circle may lie in."""
         if isinstance(self.plane, tuple):

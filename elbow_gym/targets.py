@@ -69,6 +69,17 @@ class Targets:
             return self.circles[0].position(angle)
         return np.stack([circle.position(one) for circle, one in zip(self.circles, angle, strict=True)])
 
+    def velocity(self, angle: Array) -> Array:
+        """Each target's velocity at its angle [m/s], (B, 3)."""
+        if self._alike and (self._rate == self._rate[0]).all():
+            return self.circles[0].velocity(angle)
+        return np.stack([circle.velocity(one) for circle, one in zip(self.circles, angle, strict=True)])
+
+    @property
+    def rate(self) -> Array:
+        """Signed rate of each target's angle [rad/s], (B,)."""
+        return self._rate.copy()
+
     def get_state(self) -> dict[str, Any]:
         """A copy of everything that runs on."""
         own = {"path": self._path, "rate": self._rate, "phase": self._phase}

@@ -1,4 +1,4 @@
-"""Every switch through the environments: conformance, bounds under the worst voltages, and how a wrong value is named."""
+"""Every switch through the environments: conformance, bounds under the worst voltages, and wrong values named."""
 
 import json
 
