@@ -166,4 +166,4 @@ def economical_pose(arm: ArmParameters, elbows: tuple[int, ...], circle: Circle)
 def economical_computed_torque(env: Env) -> ComputedTorque:
     """`ComputedTorque` that moves to `economical_pose` first."""
     episodes = env.unwrapped.episodes
-    return ComputedTorque(env, economical_pose(episodes.arm, episodes.settings.elbow_joints, episodes.circle.middle))
+    return ComputedTorque(env, economical_pose(episodes.arm, episodes.settings.elbow_joints, episodes.circle.widest))

@@ -30,8 +30,8 @@ SMOOTHINGS = (0.03, 0.003, 0.001)
 ROUGH_SMOOTHINGS = (0.3, 0.03)
 ROUGH_ITERATIONS = 60
 """The same with one point in a period, and the most iterations spent on it."""
-PATIENT_ITERATIONS = 250
-"""The most iterations of a fine solve that a shorter one has failed."""
+ITERATIONS = 250
+"""The most iterations at one smoothing."""
 REACH_TIME = 1.0
 """A guess goes from the start to its posture in this time [s]."""
 COARSE, FINE = 2, 3
@@ -139,7 +139,7 @@ def solve(
     guess: Trajectory,
     smoothings: Sequence[float] = SMOOTHINGS,
     progress: Progress = lambda _: None,
-    max_iter: int = 100,
+    max_iter: int = ITERATIONS,
 ) -> Solution:
     """IPOPT at one smoothing after the other; a smaller one that fails leaves the solution of the one before.
 
@@ -224,7 +224,7 @@ def refined(problem: Problem, guess: Trajectory, progress: Progress) -> Solution
         return solve(program, guess, SMOOTHINGS[1:], progress)
     except SolveError as error:
         progress(str(error))
-        return solve(program, guess, SMOOTHINGS, progress, PATIENT_ITERATIONS)
+        return solve(program, guess, SMOOTHINGS, progress)
 
 
 def optimum(

@@ -136,6 +136,7 @@ def play_on_table(
 def _instant(simulator: Simulator) -> dict[str, Array]:
     views = {
         "q": simulator.q,
+        "q_dot": simulator.q_dot,
         "hand": simulator.hand_position,
         "electrical_energy": simulator.electrical_energy,
         "drawn_energy": simulator.drawn_energy,

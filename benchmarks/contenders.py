@@ -74,10 +74,12 @@ def chain(joints: int) -> ArmParameters:
     )
 
 
-ELBOWS: dict[int, tuple[int, ...]] = {0: (), 1: (4,), 2: (4, 7)}
+ELBOWS: dict[int, tuple[int, ...]] = {0: (), 1: (4,), 2: (4, 7), 8: (4, 7, 9, 11, 13, 15, 17, 19)}
 PAPER_CASE = (10, 2)
 CASES = ((10, 0), (10, 1), PAPER_CASE, (4, 1), (20, 2), (40, 2))
 """Number of joints and of elbows of every arm that is timed."""
+MOST_ELBOWS = (20, 8)
+"""The arm that only this project is timed with."""
 
 
 def start_poses(arm: ArmParameters, elbows: tuple[int, ...], num_envs: int) -> Array:
@@ -171,7 +173,7 @@ def _reference(joints: int, elbows: int, stepping: bool) -> Sampler:
 def own_contenders() -> list[Contender]:
     """The kernel's evaluations, the simulator's RK4 steps, and the paper's method."""
     found: list[Contender] = []
-    for joints, elbows in CASES:
+    for joints, elbows in (*CASES, MOST_ELBOWS):
         arm: dict[str, Any] = {"joints": joints, "elbows": elbows}
         for arms, name in ((1, "kernel, called from Python"), (BATCH, "kernel, batch")):
             found.append(

@@ -8,7 +8,7 @@ import os
 import sys
 import time
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from importlib.util import find_spec
@@ -57,6 +57,11 @@ class Cell:
         return Problem(settings, above_table=self.elbows < 2)
 
     @property
+    def parent(self) -> Cell | None:
+        """The cell whose solution it starts from, or None."""
+        return Cell(self.elbows, self.start) if self.energy_weight != DEFAULT_WEIGHT else None
+
+    @property
     def question(self) -> dict[str, Any]:
         """The problem in JSON types: a result is taken over only where this is the same."""
         problem = self.problem
@@ -89,9 +94,9 @@ def solve_cell(cell: Cell, results: Path) -> str | None:
     def say(line: str) -> None:
         print(f"  {cell.name}: {line}", file=sys.stderr, flush=True)
 
-    parent = files(Cell(cell.elbows), results)[1]
+    parent = None if cell.parent is None else files(cell.parent, results)[1]
     try:
-        if cell.energy_weight != DEFAULT_WEIGHT and parent.is_file():
+        if parent is not None and parent.is_file():
             guesses = {"default weight": Trajectory.load(parent)}
         else:
             guesses = posture_guesses(cell.problem)
@@ -141,19 +146,18 @@ def run_cells(todo: Sequence[Cell], results: Path, workers: int) -> dict[str, st
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     with tqdm(total=len(todo), file=sys.stderr, unit="cell") as bar, ProcessPoolExecutor(workers, context) as pool:
-        # The front starts from the default weight's solutions, so it waits for them.
-        for stage in (True, False):
-            running = {
-                pool.submit(solve_cell, cell, results): cell
-                for cell in todo
-                if (cell.energy_weight == DEFAULT_WEIGHT) is stage
-            }
-            for future in as_completed(running):
-                reason = future.result()
+        # The front starts from the default weight's solution of its elbow count, so it waits for that.
+        waiting = [cell for cell in todo if cell.parent in todo]
+        running = {pool.submit(solve_cell, cell, results): cell for cell in todo if cell not in waiting}
+        while running:
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                cell, reason = running.pop(future), future.result()
                 if reason is not None:
-                    failures[running[future].name] = reason
+                    failures[cell.name] = reason
                 bar.update()
-                bar.set_description(running[future].name)
+                bar.set_description(cell.name)
+                freed = [one for one in waiting if one.parent == cell]
+                running.update({pool.submit(solve_cell, one, results): one for one in freed})
     return failures
 
 

@@ -123,11 +123,11 @@ class Circle:
         return replace(self, **values) if values else self
 
     @property
-    def middle(self) -> Circle:
-        """The circle in the middle of the ranges, in the first plane, counterclockwise from angle zero."""
+    def widest(self) -> Circle:
+        """The largest circle, else in the middle of the ranges: first plane, counterclockwise from angle zero."""
         choices = {"plane": self.planes[0], "direction": DIRECTIONS[0], "phase": 0.0}
         means = {"center": tuple(float(np.mean(ends(x))) for x in self.center)}
-        means |= {name: float(np.mean(ends(getattr(self, name)))) for name in ("radius", "period")}
+        means |= {"radius": ends(self.radius)[-1], "period": float(np.mean(ends(self.period)))}
         return replace(self, **{name: {**choices, **means}[name] for name in self.drawn})
 
     @property
