@@ -185,3 +185,10 @@ def test_no_circle_of_an_accepted_set_is_out_of_reach_by_more_than_the_set_was_f
             found = float(str(error.value).split()[-3])
             # Printed with four digits; the angles are a degree apart.
             assert found > worst - 1e-3 * (1.0 + worst)
+
+
+def test_the_widest_circle_is_fixed_and_the_largest_that_may_be_drawn():
+    widest = Circle.from_dict(EVERYTHING).widest
+    assert not widest.drawn
+    assert widest.radius == max(circle.radius for circle in [widest, *drawn(EVERYTHING)])
+    assert Circle(radius=0.2).widest == Circle(radius=0.2)
