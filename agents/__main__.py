@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import sys
-from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Literal
 
 import tyro
 
 from agents.cli import run
-from agents.train import PPOSettings
-
-DEFAULT_PPO = PPOSettings()
+from agents.train_command import train_command
 
 app = tyro.extras.SubcommandApp()
 
@@ -38,40 +33,7 @@ def reproduce(output: Path = Path("reproduction"), publish: bool = False, table:
     reproduce_paper(output, publish=publish)
 
 
-@app.command
-def train(
-    algorithm: tyro.conf.Positional[Literal["ppo"]],
-    /,
-    elbows: int = 2,
-    seed: int = 0,
-    output: Path | None = None,
-    environment: str = "{}",
-    checkpoint_every: int = 100_000,
-    minutes: float | None = None,
-    ppo: Annotated[PPOSettings, tyro.conf.arg(name="")] = DEFAULT_PPO,
-) -> None:
-    """Trains an agent; Ctrl-C keeps the best policy so far.
-
-    Args:
-        algorithm: the algorithm.
-        elbows: elbows on the table.
-        seed: of networks, sampling and arms.
-        output: folder for the policy, checkpoints and logs; runs/ALGORITHM_elbowsN_seedS when not given.
-        environment: more arguments of the environment as a JSON object, such as '{"energy_weight": 0.002}'.
-        checkpoint_every: control periods between two evaluations and checkpoints.
-        minutes: ends the training after so many.
-        ppo: the algorithm's settings.
-    """
-    from agents.keeper import sentence
-    from agents.train import train_ppo
-    from elbow_gym.settings import Settings
-
-    settings = Settings(**{"elbows": elbows, **json.loads(environment)})
-    folder = Path("runs") / f"{algorithm}_elbows{elbows}_seed{seed}" if output is None else output
-    print(f"{algorithm} with {elbows} elbows, seed {seed}, into {folder}: {asdict(ppo)}")
-    policy = train_ppo(settings, ppo, seed, folder, checkpoint_every, minutes)
-    figures = {key: value for key, value in policy.card.evaluation.items() if key != "seeds"}
-    print(f"best: {sentence(figures)}\n{folder / 'best.json'}")
+app.command(train_command(sys.argv[1:]), name="train")
 
 
 @app.command
@@ -97,6 +59,18 @@ def evaluate(policy: tyro.conf.Positional[str], /, elbows: int | None = None, ep
 
         results = in_all_regimes(settings, make, seeds, advance)
     print_results(f"{policy}, elbows {settings.elbow_joints}, {episodes} episodes: mean ± standard deviation", results)
+
+
+@app.command
+def report(output: Path = Path("report.html")) -> None:
+    """One HTML file to look at: every controller's run to replay, the paper's Figs 1-25 and the benchmark.
+
+    Args:
+        output: the file; it opens without a network.
+    """
+    from agents.report import report as write_report
+
+    write_report(output)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from agents.evaluate import BENCHMARK_SEEDS, CLASSICAL, SHIFTED, in_all_regimes,
 from agents.files import write_csv, write_text, write_whole
 from agents.lqr import TimeVaryingLQR
 from agents.metrics import REGIMES, UNITS, Regime
-from agents.policy import SHIPPED
+from agents.policy import shipped_seeds
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES, ELBOW_NAMES, pyplot
 from agents.trajectory import Trajectory
 from benchmarks import breakdown, pareto
@@ -52,7 +52,7 @@ def cells() -> list[tuple[str, int]]:
         ("lqr", elbows) for elbows in ELBOW_COUNTS if all(files(Cell(elbows, start))[1].is_file() for start in starts)
     ]
     learned = [(name, elbows) for name in ("ppo", "sac") for elbows in ELBOW_COUNTS]
-    learned = [(name, elbows) for name, elbows in learned if (SHIPPED / f"{name}_elbows{elbows}.json").is_file()]
+    learned = [(name, elbows) for name, elbows in learned if shipped_seeds(f"{name}_elbows{elbows}")]
     return classical + planned + learned
 
 
