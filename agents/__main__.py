@@ -1,9 +1,10 @@
-"""The command line: `python -m agents reproduce | train | evaluate`."""
+"""The command line: `python -m agents reproduce | train | evaluate | watch`."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Literal
 
 import tyro
 
@@ -71,6 +72,38 @@ def report(output: Path = Path("report.html")) -> None:
     from agents.report import report as write_report
 
     write_report(output)
+
+
+@app.command
+def watch(
+    controller: tyro.conf.Positional[str],
+    /,
+    versus: str | None = None,
+    elbows: int | None = None,
+    start: Literal["paper", "on_target"] = "paper",
+    seed: int = 0,
+    speed: float = 1.0,
+    size: tuple[int, int] = (640, 480),
+    output: Path | None = None,
+) -> None:
+    """Shows a controller at work in a window, in real time; without a display it writes a video instead.
+
+    Args:
+        controller: as for `evaluate`.
+        versus: another controller beside it, with the same start and in step.
+        elbows: elbows on the table; the policy's own, or 2, when not given.
+        start: "paper": the paper's start pose; "on_target": the hand starts on the circle.
+        seed: of the start pose.
+        speed: seconds of the arm in one second.
+        size: width and height of each controller's picture in pixels.
+        output: a .gif or .mp4 to write instead of opening a window.
+    """
+    from agents.watch import watch as watch_controllers
+
+    names = [controller] if versus is None else [controller, versus]
+    written = watch_controllers(names, elbows=elbows, start=start, seed=seed, speed=speed, size=size, output=output)
+    if written is not None:
+        print(written)
 
 
 if __name__ == "__main__":

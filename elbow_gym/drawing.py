@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -21,6 +20,8 @@ TABLE: Colour = (240, 239, 235)
 TABLE_EDGE: Colour = (196, 194, 187)
 GRID: Colour = (214, 213, 207)
 INK: Colour = (38, 46, 56)
+# Taken off what it falls on.
+SHADOW: Colour = (66, 64, 60)
 LINK: Colour = (104, 122, 142)
 JOINT: Colour = (58, 70, 84)
 ELBOW: Colour = (230, 159, 0)
@@ -30,7 +31,11 @@ TRACE: Colour = (0, 114, 178)
 
 # Direction to the light, over its height: shadows fall away from it.
 LIGHT = np.array([-0.25, 0.3])
-SHADE_STEPS = 6
+# Round things are painted from their dark rim to the light, in so many steps.
+SHARES = np.linspace(0.0, 1.0, 6)
+BALL_LIGHT = np.array([-0.3, -0.38])
+LOW_SIDE, HIGH_SIDE = -1.0 + 1.3 * SHARES, 1.0 - 0.62 * SHARES
+WHOLE = np.ones(1)
 
 
 @lru_cache(4096)
@@ -38,6 +43,13 @@ def mix(first: Colour, second: Colour, share: float) -> Colour:
     """The colour `share` of the way from the first to the second."""
     red, green, blue = (round(a + (b - a) * share) for a, b in zip(first, second, strict=True))
     return red, green, blue
+
+
+@lru_cache(64)
+def tones_of(colour: Colour) -> tuple[Colour, ...]:
+    """The colour from its dark rim to its highlight, one for each of `SHARES`."""
+    dark, light = mix(colour, INK, 0.38), mix(colour, (255, 255, 255), 0.47)
+    return tuple(mix(dark, light, float(share)) for share in SHARES)
 
 
 class Painter:
@@ -56,8 +68,8 @@ class Painter:
         self.surface = self._pygame.Surface(size)
         self._stage = self._paint_stage(size)
 
-    def _points(self, world: Array) -> list[tuple[float, float]]:
-        return [(float(x), float(y)) for x, y in self._camera.project(world)]
+    def _points(self, world: Array) -> list[list[float]]:
+        return self._camera.project(world).tolist()
 
     def _disc(self, radius: float, height: float, count: int = 96) -> Array:
         angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
@@ -114,15 +126,14 @@ class Painter:
             return
         width, height = (int(side) for side in high - low)
         dark = pygame.Surface((width, height))
-        dark.fill((255, 255, 255))
         for k in range(len(joints) - 1):
             a, b = centres[k] - low, centres[k + 1] - low
-            pygame.draw.polygon(dark, (186, 188, 192), band(a, b, across[k], across[k + 1]))
-            pygame.draw.circle(dark, (186, 188, 192), b, across[k + 1])
+            pygame.draw.polygon(dark, SHADOW, band(a, b, across[k], across[k + 1])[0])
+            pygame.draw.circle(dark, SHADOW, b, across[k + 1])
         # Shrunk and enlarged again its edge is soft.
         soft = pygame.transform.smoothscale(dark, (max(1, width // coarser), max(1, height // coarser)))
         soft = pygame.transform.smoothscale(soft, (less * width, less * height))
-        self.surface.blit(soft, (less * int(low[0]), less * int(low[1])), special_flags=pygame.BLEND_RGB_MULT)
+        self.surface.blit(soft, (less * int(low[0]), less * int(low[1])), special_flags=pygame.BLEND_RGB_SUB)
 
     def line(self, world: Array, colour: Colour, thickness: float, closed: bool = False) -> None:
         """A line through points [m], (m, 3), some pixels thick."""
@@ -143,20 +154,16 @@ class Painter:
     def ball(self, centre: Array, radius: float, colour: Colour) -> None:
         """A shaded ball, radius in metres."""
         at, size = self._camera.project(centre), radius * float(self._camera.scale(centre))
-        for k in range(SHADE_STEPS):
-            share = k / (SHADE_STEPS - 1)
-            shift = share * size * np.array([-0.3, -0.38])
-            tone = mix(mix(colour, INK, 0.35), mix(colour, (255, 255, 255), 0.5), share)
-            self._pygame.draw.circle(self.surface, tone, at + shift, max(size * (1.0 - 0.88 * share), 1.0))
+        for share, tone in zip(SHARES, tones_of(colour), strict=True):
+            middle = at + share * size * BALL_LIGHT
+            self._pygame.draw.circle(self.surface, tone, middle, max(size * (1.0 - 0.88 * share), 1.0))
 
     def link(self, ends: Array, radii: Array, colour: Colour) -> None:
         """A shaded tapered rod between two points (2, 3), radii in metres."""
         (a, b), (thick, thin) = self._camera.project(ends), radii * self._camera.scale(ends)
-        for k in range(SHADE_STEPS):
-            share = k / (SHADE_STEPS - 1)
-            low, high = -1.0 + 1.3 * share, 1.0 - 0.62 * share
-            tone = mix(mix(colour, INK, 0.4), mix(colour, (255, 255, 255), 0.45), share)
-            self._pygame.draw.polygon(self.surface, tone, band(a, b, thick, thin, low, high))
+        tones = tones_of(colour)
+        for tone, corners in zip(tones, band(a, b, thick, thin, LOW_SIDE, HIGH_SIDE), strict=True):
+            self._pygame.draw.polygon(self.surface, tone, corners)
 
     def arrow(self, tail: Array, tip: Array, colour: Colour, thickness: float) -> None:
         """An arrow between two points [m], (3,), with a shaft some pixels thick."""
@@ -172,21 +179,20 @@ class Painter:
             half = thickness / 2.0 + grown
             foot, point = start - grown * along, end + 1.6 * grown * along
             corners = [neck - (0.55 * head + 1.4 * grown) * side, neck + (0.55 * head + 1.4 * grown) * side]
-            draw.polygon(self.surface, tone, band(foot, neck, half, half))
+            draw.polygon(self.surface, tone, band(foot, neck, half, half)[0])
             draw.polygon(self.surface, tone, [corners[0] - grown * along, point, corners[1] - grown * along])
 
 
 def band(
-    a: Array, b: Array, thick: float, thin: float, low: float = -1.0, high: float = 1.0
-) -> Sequence[tuple[float, float]]:
-    """Corners of a tapered band between two pixels, half `thick` wide at a; low and high choose a part of its width.
+    a: Array, b: Array, thick: float, thin: float, low: Array = -WHOLE, high: Array = WHOLE
+) -> list[list[list[float]]]:
+    """Corners of tapered bands between two pixels, half `thick` wide at a and half `thin` at b.
 
-    Its high side is the upper one in the picture.
+    Each entry of low and high chooses a part of the width between -1 and 1, the upper side in the picture.
     """
     along = b - a
-    length = max(float(np.hypot(along[0], along[1])), 1e-9)
-    side = np.array([along[1], -along[0]]) / length
+    side = np.array([along[1], -along[0]]) / max(float(np.hypot(along[0], along[1])), 1e-9)
     if side[1] > 0.0:
         side = -side
-    corners = (a + low * thick * side, a + high * thick * side, b + high * thin * side, b + low * thin * side)
-    return [(float(x), float(y)) for x, y in corners]
+    across = np.stack([low * thick, high * thick, high * thin, low * thin], axis=-1)
+    return (np.stack([a, a, b, b]) + across[..., None] * side).tolist()

@@ -35,6 +35,21 @@ def pixels_of(surface: Any) -> Pixels:
     return np.frombuffer(pygame.image.tobytes(surface, "RGB"), dtype=np.uint8).reshape(height, width, 3).copy()
 
 
+def display_driver() -> str | None:
+    """What windows would be shown with; None where nobody would see them."""
+    pygame = load_pygame()
+    ready = pygame.display.get_init()
+    try:
+        pygame.display.init()
+        driver = pygame.display.get_driver()
+    except pygame.error:
+        return None
+    finally:
+        if not ready:
+            pygame.display.quit()
+    return None if driver in ("dummy", "offscreen") else str(driver)
+
+
 class Window:
     """A window that opens with its first picture. Once the user has closed it, it stays closed.
 
@@ -48,11 +63,6 @@ class Window:
         self._clock: Any = None
         self.closed = False
         """Whether the user has closed it."""
-
-    @property
-    def visible(self) -> bool:
-        """Whether somebody can see it: False where there is no display."""
-        return self._surface is not None and load_pygame().display.get_driver() not in ("dummy", "offscreen")
 
     def show(self, pixels: Pixels, frames_per_second: float) -> None:
         """Shows a picture (height, width, 3), not earlier than a frame's time after the one before."""
