@@ -1,15 +1,18 @@
-"""The command line: `python -m agents reproduce | train | evaluate | watch`."""
+"""The command line: `python -m agents reproduce | train | clone | publish | evaluate | watch | report`."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import tyro
 
+from agents.algorithms import CloneSettings
 from agents.cli import run
 from agents.train_command import train_command
+
+CLONE = CloneSettings()
 
 app = tyro.extras.SubcommandApp()
 
@@ -38,20 +41,68 @@ app.command(train_command(sys.argv[1:]), name="train")
 
 
 @app.command
-def evaluate(policy: tyro.conf.Positional[str], /, elbows: int | None = None, episodes: int = 20) -> None:
+def clone(
+    elbows: int = 2,
+    seeds: int = 1,
+    first_seed: int = 0,
+    output: Path = Path("runs"),
+    trajectory: Path | None = None,
+    settings: Annotated[CloneSettings, tyro.conf.arg(name="")] = CLONE,
+) -> None:
+    """Clones the optimal trajectory and the LQR around it into networks, one folder OUTPUT/clone_elbowsN_seedK a seed.
+
+    Args:
+        elbows: elbows on the table.
+        seeds: how many networks.
+        first_seed: the first of the seeds.
+        output: folder of the runs.
+        trajectory: what is cloned; the benchmark's optimum for the elbow count when not given.
+        settings: of the imitation.
+    """
+    from agents.cloning import clone_all
+    from agents.trajectory import OPTIMA
+    from elbow_gym.settings import Settings
+
+    chosen = list(range(first_seed, first_seed + seeds))
+    folders = [output / f"clone_elbows{elbows}_seed{seed}" for seed in chosen]
+    source = OPTIMA / f"elbows{elbows}.npz" if trajectory is None else trajectory
+    command = " ".join(["python -m agents", *sys.argv[1:]])
+    for result in clone_all(Settings(elbows=elbows), source, settings, chosen, folders, command).values():
+        print(f"{result['name']}: {result['training_seconds']:.0f} s, return {result['best']['return']:.2f}")
+
+
+@app.command
+def publish(runs: tyro.conf.Positional[tuple[Path, ...]], /, replace_seeds: bool = False) -> None:
+    """Takes finished runs over: best policies into agents/policies, curves into benchmarks/results/learning.
+
+    Args:
+        runs: folders of the runs, as the training named them.
+        replace_seeds: also remove the shipped seeds of the same algorithm and task that are not among them.
+    """
+    from agents.publish import publish as publish_runs
+
+    for name in publish_runs(runs, replace_seeds=replace_seeds):
+        print(name)
+
+
+@app.command
+def evaluate(
+    policy: tyro.conf.Positional[str], /, elbows: int | None = None, env: str = "ElbowArm-v0", episodes: int = 20
+) -> None:
     """Plays a controller in the regimes A, B and C and prints what it cost.
 
     Args:
         policy: "pd", "pd_paper", "pd_smooth", "pd_gravity", "computed_torque", "computed_torque_posture", the algorithm
             of a shipped policy ("ppo"), or the path of a policy.
         elbows: elbows on the table; the policy's own, or 2, when not given.
+        env: the environment's id, unless the policy is a path.
         episodes: start poses, one fixed seed each.
     """
     from tqdm import tqdm
 
     from agents.evaluate import BENCHMARK_SEEDS, in_all_regimes, named_controller, print_results
 
-    settings, make = named_controller(policy, elbows)
+    settings, make = named_controller(policy, elbows, env)
     seeds = [BENCHMARK_SEEDS[0] + k for k in range(episodes)]
     with tqdm(total=200, unit="%", desc=policy, file=sys.stderr) as bar:
 
