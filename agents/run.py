@@ -47,14 +47,14 @@ class Run:
 
     def card(self, training: dict[str, Any]) -> dict[str, Any]:
         """The arguments of `policy_of` that tell how the policy was made; `training` says how far it has come."""
-        own = {"seed": self.seed, **training, "machine": f"{platform.machine()}, {os.cpu_count()} cores"}
+        own = {"seed": self.seed, **training, "machine": machine()}
         if self.initial_policy is not None:
             own["initial_policy"] = self.initial_policy.name
         return {
             "command": " ".join(["python -m agents", *sys.argv[1:]]),
             "env": self.env,
             "training": {**asdict(self.settings), **own},
-            "versions": {name: version(name) for name in PACKAGES},
+            "versions": versions(),
         }
 
     def record(self) -> dict[str, Any]:
@@ -87,6 +87,16 @@ class Run:
                 raise ValueError(
                     f"{name} of a resumed run must be {before.get(name)!r} as in {path}, got {now.get(name)!r}"
                 )
+
+
+def machine() -> str:
+    """A word on the machine, for the cards of policies."""
+    return f"{platform.machine()}, {os.cpu_count()} cores"
+
+
+def versions() -> dict[str, str]:
+    """Of the packages that a training depends on."""
+    return {name: version(name) for name in PACKAGES}
 
 
 def flat(plain: dict[str, Any], prefix: str = "") -> dict[str, Any]:
