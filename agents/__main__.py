@@ -131,6 +131,7 @@ def watch(
     /,
     versus: str | None = None,
     elbows: int | None = None,
+    env: str = "ElbowArm-v0",
     start: Literal["paper", "on_target"] = "paper",
     seed: int = 0,
     speed: float = 1.0,
@@ -142,7 +143,8 @@ def watch(
     Args:
         controller: as for `evaluate`.
         versus: another controller beside it, with the same start and in step.
-        elbows: elbows on the table; the policy's own, or 2, when not given.
+        elbows: elbows on the table; the environment's own number when not given.
+        env: id of the environment; a policy's file brings its own.
         start: "paper": the paper's start pose; "on_target": the hand starts on the circle.
         seed: of the start pose.
         speed: seconds of the arm in one second.
@@ -152,7 +154,9 @@ def watch(
     from agents.watch import watch as watch_controllers
 
     names = [controller] if versus is None else [controller, versus]
-    written = watch_controllers(names, elbows=elbows, start=start, seed=seed, speed=speed, size=size, output=output)
+    written = watch_controllers(
+        names, env=env, elbows=elbows, start=start, seed=seed, speed=speed, size=size, output=output
+    )
     if written is not None:
         print(written)
 

@@ -17,6 +17,8 @@ FRAME_RATES = {".gif": 100.0 / 6.0, ".mp4": 25.0}
 hundredths of a second."""
 COLOURS = 128
 """In a GIF's palette."""
+VIVID = 60
+"""Colours whose channels lie further apart than this are not greys."""
 
 Pixels = NDArray[np.uint8]
 
@@ -48,8 +50,11 @@ def _write_gif(path: Path, frames: Iterable[Pixels], frames_per_second: float, h
 
     plain = [Image.fromarray(frame) for frame in frames]
     # One palette for all and no dithering: what does not change then costs nothing.
-    some = [np.asarray(plain[k]) for k in np.linspace(0, len(plain) - 1, 8).astype(int)]
-    palette = Image.fromarray(np.concatenate(some)).quantize(COLOURS, dither=Image.Dither.NONE)
+    some = np.stack([np.asarray(plain[k]) for k in np.linspace(0, len(plain) - 1, 8).astype(int)])
+    vivid = some[some.max(axis=-1).astype(int) - some.min(axis=-1) > VIVID]
+    # Few pixels have the colours that carry meaning; as many more of them keep those in the palette.
+    shown = np.concatenate([*some, *np.resize(vivid, (8 if len(vivid) else 0, *some.shape[1:]))])
+    palette = Image.fromarray(shown).quantize(COLOURS, dither=Image.Dither.NONE)
     first, *rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in plain)
     duration = [round(1000.0 / frames_per_second)] * len(plain)
     duration[-1] += round(1000.0 * hold)

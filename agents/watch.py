@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -40,13 +41,14 @@ class Performance:
 
     Args:
         name: of the controller, as `named_controller` takes it.
-        elbows: elbows on the table; the policy's own, or 2, when None.
+        env: id of the environment.
+        elbows: elbows on the table; the environment's own number when None.
         start: the environment's `start`.
         size: width and height of its pictures without the label [pixels].
     """
 
-    def __init__(self, name: str, elbows: int | None, start: str, size: tuple[int, int]) -> None:
-        settings, make = named_controller(name, elbows)
+    def __init__(self, name: str, env: str, elbows: int | None, start: str, size: tuple[int, int]) -> None:
+        settings, make = named_controller(name, elbows, env)
         self._env = ElbowArmVectorEnv(1, **replace(settings, start=start).arguments, autoreset_mode="Disabled")
         self._controller = make(self._env)
         title, colour = style_of(name)
@@ -97,13 +99,15 @@ def frames(performances: Sequence[Performance], seed: int, frames_per_second: fl
 
 
 def count_frames(performances: Sequence[Performance], frames_per_second: float, speed: float) -> int:
-    """Pictures of the longest episode after the first."""
-    return round(max(performance.duration for performance in performances) * frames_per_second / speed)
+    """Pictures of the longest episode after the first; the last shows its end."""
+    duration = max(performance.duration for performance in performances)
+    return math.ceil(duration * frames_per_second / speed - 1e-9)
 
 
 def watch(
     names: Sequence[str],
     *,
+    env: str = "ElbowArm-v0",
     elbows: int | None = None,
     start: str = "paper",
     seed: int = 0,
@@ -117,7 +121,8 @@ def watch(
 
     Args:
         names: of the controllers.
-        elbows: elbows on the table.
+        env: id of the environment.
+        elbows: elbows on the table; the environment's own number when None.
         start: the environment's `start`.
         seed: of the start pose; the window goes on with the next ones.
         speed: how many seconds of the arm pass in one of the watcher's.
@@ -133,7 +138,7 @@ def watch(
     positive("speed", speed)
     if output is not None:
         check_video(output)
-    performances = [Performance(name, elbows, start, size) for name in names]
+    performances = [Performance(name, env, elbows, start, size) for name in names]
     if output is None and display_driver() is not None:
         _into_window(performances, " and ".join(names), seed, speed)
         return None

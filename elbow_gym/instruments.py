@@ -6,17 +6,19 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from elbow_gym.drawing import GRID, INK, TRACE, Colour, mix
+from elbow_gym.drawing import GRID, INK, Colour, mix
 from elbow_gym.parameters import Array
 from elbow_gym.screen import load_pygame
 
 MUTED: Colour = (98, 108, 120)
-REGENERATED: Colour = (86, 180, 233)
 # The power axis: linear around zero up to this [W], then logarithmic.
 SMALLEST_POWER = 0.1
 LARGEST_POWER = 1000.0
 LEAST_POWER = -10.0
 TICKS = (-10.0, 0.0, 10.0, 100.0, 1000.0)
+
+# Letters are drawn so many times larger and shrunk: small fonts put them on whole pixels, unevenly.
+FINER = 4
 
 
 def bar_height(power: float) -> float:
@@ -47,15 +49,17 @@ class Instruments:
         unit = self.unit
         return 26.0 * unit, 92.0 * unit, self._width - 52.0 * unit, self._height - (92.0 + 124.0) * unit
 
-    def _font(self, size: float) -> Any:
-        pixels = max(8, round(size * self.unit))
+    def _written(self, words: str, size: float, colour: Colour) -> Any:
+        pygame, pixels = self._pygame, max(8, round(size * self.unit))
         try:
-            self._fonts[pixels].size("0")
-        except (KeyError, self._pygame.error):
+            self._fonts[pixels].size(words)
+        except (KeyError, pygame.error):
             # Somebody's pygame.quit() takes all fonts with it.
-            self._pygame.font.init()
-            self._fonts[pixels] = self._pygame.font.Font(None, pixels)
-        return self._fonts[pixels]
+            pygame.font.init()
+            self._fonts[pixels] = pygame.font.Font(None, FINER * pixels)
+        fine = self._fonts[pixels].render(words, True, colour)
+        width, height = fine.get_size()
+        return pygame.transform.smoothscale(fine, (max(1, width // FINER), max(1, height // FINER)))
 
     def text(
         self, surface: Any, words: str, at: tuple[float, float], size: float, colour: Colour = INK, align: float = 0.0
@@ -68,7 +72,7 @@ class Instruments:
         if key not in self._texts:
             if len(self._texts) > 400:
                 self._texts.clear()
-            self._texts[key] = self._font(size).render(words, True, colour)
+            self._texts[key] = self._written(words, size, colour)
         written = self._texts[key]
         surface.blit(written, (round(at[0] - align * written.get_width()), round(at[1])))
         return float(written.get_width())
@@ -93,8 +97,8 @@ class Instruments:
             left += size + 5.0 * unit
             left += self.text(surface, meaning, (left, top), 17, MUTED) + 18.0 * unit
 
-    def bars(self, surface: Any, power: Array) -> None:
-        """The power of each joint [W], (n,), at the bottom."""
+    def bars(self, surface: Any, power: Array, colour: Colour) -> None:
+        """The power of each joint [W], (n,), at the bottom; paler where it is fed back."""
         draw, unit = self._pygame.draw, self.unit
         left, right = 52.0 * unit, self._width - 16.0 * unit
         top, bottom = self._height - 98.0 * unit, self._height - 20.0 * unit
@@ -111,6 +115,6 @@ class Instruments:
         for k, watts in enumerate(power):
             x, height = left + k * step, rise * bar_height(float(watts))
             bar = (round(x + 0.2 * step), round(zero - max(height, 0.0)), max(1, round(0.6 * step)), round(abs(height)))
-            draw.rect(surface, TRACE if watts >= 0.0 else REGENERATED, bar)
+            draw.rect(surface, colour if watts >= 0.0 else mix(colour, (255, 255, 255), 0.5), bar)
             if (k + 1) % every == 0 or k == 0:
                 self.text(surface, f"{k + 1}", (x + step / 2.0, bottom + 4.0 * unit), 16, mix(MUTED, INK, 0.4), 0.5)

@@ -50,6 +50,8 @@ class Scene:
     """Since the start [s]."""
     support: tuple[str, str]
     """What carries the arm: a number and what it counts."""
+    may_pull: bool = True
+    """Whether some of the contacts can hold the arm down."""
     payload: float = 0.0
     """Mass at the hand [kg]."""
 
@@ -77,7 +79,7 @@ class Renderer:
         stage: what stays the same.
         width: of a picture [pixels].
         height: of a picture [pixels].
-        accent: colour of the hand's trace.
+        accent: colour of the hand's trace and of the bars.
     """
 
     def __init__(self, stage: Stage, width: int, height: int, accent: Colour = TRACE) -> None:
@@ -186,9 +188,11 @@ class Renderer:
             write.text(surface, words, (float(x), float(y) - 17.0 * unit), 18, colour, 0.5)
         meaning = [("target", INK), ("hand", self._accent)]
         if len(scene.contacts):
-            meaning += [("table pushes", PUSH), ("table pulls", PULL)]
+            meaning.append(("table pushes", PUSH))
+        if scene.may_pull:
+            meaning.append(("table pulls", PULL))
         write.legend(surface, meaning)
-        write.bars(surface, scene.power)
+        write.bars(surface, scene.power, self._accent)
 
 
 def cut_at_table(joints: Array, radii: Array, height: float) -> list[tuple[Array, Array, bool]]:

@@ -36,7 +36,7 @@ class Viewer:
         render_mode: "rgb_array", "human", or None for an onlooker that never draws and costs nothing.
         render_width: of each picture [pixels].
         render_height: of each picture [pixels].
-        accent: colour of the hands' traces.
+        accent: colour of the hands' traces and of the bars.
 
     Raises ValueError naming the argument; the sides are whole numbers of at least 64 pixels.
     """
@@ -156,6 +156,7 @@ class Viewer:
             error=float(np.linalg.norm(joints[-1] - target)),
             time=float(simulator.time[i]),
             support=support,
+            may_pull=len(simulator.elbows) > 0,
             payload=float(population.values["payload"][i]),
         )
 
