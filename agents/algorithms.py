@@ -10,7 +10,7 @@ from typing import Any, Literal
 FLOOR = 0.05
 """A falling learning rate ends at this share of its start."""
 
-Activation = Literal["tanh", "relu", "elu"]
+Activation = Literal["tanh", "relu", "elu", "silu"]
 Start = Literal["paper", "on_target"]
 
 
@@ -53,6 +53,9 @@ class AlgorithmSettings:
     """Of the start pose while it trains [rad]; the environment's own when None. Evaluations keep the environment's."""
     start: Start | None = None
     """Where episodes start while it trains; as in the environment when None."""
+    first_energy_share: float = 1.0
+    """Share of the reward's energy weight that the training starts with. It rises linearly until half of the training
+    is done: noise on the voltages costs power, and a high price on it ends exploration too early."""
     evaluate_every: int = 50_000
     """Control periods between two evaluations."""
 
@@ -60,6 +63,10 @@ class AlgorithmSettings:
     def log_interval(self) -> int:
         """Rollouts between two entries in TensorBoard."""
         return 1
+
+    def energy_share(self, done: float) -> float:
+        """Share of the energy weight when this share of the training is done."""
+        return min(1.0, self.first_energy_share + (1.0 - self.first_energy_share) * done / 0.5)
 
     def training_arguments(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
         """The environment's arguments for the training, from those of the evaluation."""
@@ -84,7 +91,7 @@ class AlgorithmSettings:
     def _common(self, env: Any, seed: int, log: Path, critic: str) -> dict[str, Any]:
         import torch
 
-        kinds = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU}
+        kinds = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU, "silu": torch.nn.SiLU}
         widths = self.hidden if self.critic_hidden is None else self.critic_hidden
         return {
             "policy": "MlpPolicy",
@@ -96,6 +103,7 @@ class AlgorithmSettings:
             "policy_kwargs": {
                 "net_arch": {"pi": list(self.hidden), critic: list(widths)},
                 "activation_fn": kinds[self.activation],
+                "optimizer_kwargs": {"fused": True},
             },
             "tensorboard_log": str(log),
             "seed": seed,

@@ -104,6 +104,8 @@ class Keeper(BaseCallback):
         return self._run.minutes is None or spent < 60.0 * self._run.minutes
 
     def _on_rollout_start(self) -> None:
+        done = self.num_timesteps / self._run.settings.total_timesteps
+        self._env.set_energy_weight(self._run.settings.energy_share(done) * self._settings.energy_weight)
         every = self._run.settings.evaluate_every
         if self.num_timesteps // every > self._evaluated // every:
             self.evaluate(self.model)

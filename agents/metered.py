@@ -1,7 +1,8 @@
-"""The training's environment: it also keeps the means of what the reward is made of, for TensorBoard."""
+"""The training's environment: episodes that do not all end together, and means of what the reward is made of."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,23 @@ class MeteredVectorEnv(ElbowArmVectorEnv):
     def __init__(self, num_envs: int = 1, **arguments: Any) -> None:
         super().__init__(num_envs, **arguments, autoreset_mode="SameStep")
         self._sums = dict.fromkeys(METERS, 0.0)
+        self.staggered = False
+        """Whether a reset of all arms puts their first episodes' clocks at evenly spread times. Episodes are equally
+        long: otherwise all arms of a rollout show the same part of the task, and an update forgets the others."""
         self.metered_periods = 0
         """Control periods since the last reading, of all arms together."""
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """As `ElbowArmVectorEnv.reset`; when `staggered`, an arm's first episode is the shorter the higher its number."""
+        observation, info = super().reset(seed=seed, options=options)
+        if self.staggered:
+            state = self.get_state()
+            state["episodes"]["steps"] = np.arange(self.num_envs) * self.settings.horizon // self.num_envs
+            self.set_state(state)
+            observation = self.episodes.look().observation
+        return observation, info
 
     def step(
         self, actions: NDArray[np.float32]

@@ -25,6 +25,7 @@ ACTIVATIONS = {
     "tanh": np.tanh,
     "relu": lambda x: np.maximum(x, 0.0),
     "elu": lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0))),
+    "silu": lambda x: x / (1.0 + np.exp(-x)),
 }
 OUTPUTS = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
 """How the last layer becomes an action: PPO's is clipped, SAC's squashed."""
@@ -129,7 +130,7 @@ class Policy:
         """The same as a `torch.nn.Sequential` that maps observations to actions, for whoever trains on."""
         import torch
 
-        kinds = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU}
+        kinds = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU, "silu": torch.nn.SiLU}
         layers: list[Any] = []
         for k, (size, after) in enumerate(zip(self.card.layers[:-1], self.card.layers[1:], strict=True)):
             linear = torch.nn.Linear(size, after)

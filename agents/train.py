@@ -65,6 +65,7 @@ def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
     try:
         if not found:
             _prepare(run, model, env, keeper)
+        env.staggered = True
         remaining = total - model.num_timesteps
         model.learn(remaining, callback=keeper, log_interval=run.settings.log_interval, reset_num_timesteps=False)
     except KeyboardInterrupt:

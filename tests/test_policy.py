@@ -37,7 +37,7 @@ def test_policy_acts_as_the_model_that_it_came_from(model, policy):
     np.testing.assert_allclose(policy.predict(observation[0])[0], expected[0], atol=1e-6)
 
 
-@pytest.mark.parametrize(("activation", "output"), [("tanh", "clip"), ("relu", "tanh"), ("elu", "clip")])
+@pytest.mark.parametrize(("activation", "output"), [("tanh", "clip"), ("relu", "tanh"), ("elu", "clip"), ("silu", "clip")])
 def test_torch_form_acts_as_the_numpy_one(policy, activation, output):
     other = Policy(replace(policy.card, activation=activation, output=output), policy.weights)
     observation = np.random.default_rng(1).normal(size=(9, policy.card.layers[0]), scale=3.0).astype(np.float32)

@@ -16,6 +16,7 @@ from stable_baselines3 import PPO
 from agents.algorithms import PPOSettings, SACSettings
 from agents.checkpoint import checkpoints
 from agents.keeper import COLUMNS, Keeper
+from agents.metered import MeteredVectorEnv
 from agents.policy import load_policy
 from agents.run import Run
 from agents.train import train, train_all
@@ -228,3 +229,22 @@ def test_warm_start_shows_how_the_task_is_done(tmp_path):
     assert np.ptp(model.replay_buffer.actions[:250] - 0.0) > 0.5
     narrow = model.predict(model.replay_buffer.observations[0], deterministic=False)[0]
     assert np.abs(narrow).max() < 0.6
+
+
+def test_staggered_arms_end_their_first_episodes_one_after_the_other():
+    env = MeteredVectorEnv(5, duration=0.5)
+    env.staggered = True
+    first, _ = env.reset(seed=0)
+    angle = np.arctan2(*env.decode(first)["target_angle"].T[::-1])
+    assert angle == pytest.approx(2.0 * np.pi * np.arange(5) * 0.1 / 5.0, abs=1e-6)
+    ends = []
+    for k in range(1, 26):
+        _, _, _, truncated, _ = env.step(np.zeros((5, 10), np.float32))
+        ends += [(k, int(i)) for i in np.flatnonzero(truncated)]
+    assert ends == [(5, 4), (10, 3), (15, 2), (20, 1), (25, 0)]
+
+
+def test_price_of_power_rises_until_half_of_the_training():
+    settings = replace(SMALL, first_energy_share=0.2)
+    assert [settings.energy_share(done) for done in (0.0, 0.25, 0.5, 1.0)] == pytest.approx([0.2, 0.6, 1.0, 1.0])
+    assert SMALL.energy_share(0.0) == 1.0
