@@ -1,19 +1,18 @@
-"""The command line: `python -m agents reproduce | train | evaluate`."""
+"""The command line: `python -m agents reproduce | train | clone | publish | evaluate | watch | report`."""
 
 from __future__ import annotations
 
-import json
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
+from agents.algorithms import CloneSettings
 from agents.cli import run
-from agents.train import PPOSettings
+from agents.train_command import train_command
 
-DEFAULT_PPO = PPOSettings()
+CLONE = CloneSettings()
 
 app = tyro.extras.SubcommandApp()
 
@@ -38,57 +37,72 @@ def reproduce(output: Path = Path("reproduction"), publish: bool = False, table:
     reproduce_paper(output, publish=publish)
 
 
+app.command(train_command(sys.argv[1:]), name="train")
+
+
 @app.command
-def train(
-    algorithm: tyro.conf.Positional[Literal["ppo"]],
-    /,
+def clone(
     elbows: int = 2,
-    seed: int = 0,
-    output: Path | None = None,
-    environment: str = "{}",
-    checkpoint_every: int = 100_000,
-    minutes: float | None = None,
-    ppo: Annotated[PPOSettings, tyro.conf.arg(name="")] = DEFAULT_PPO,
+    seeds: int = 1,
+    first_seed: int = 0,
+    output: Path = Path("runs"),
+    trajectory: Path | None = None,
+    settings: Annotated[CloneSettings, tyro.conf.arg(name="")] = CLONE,
 ) -> None:
-    """Trains an agent; Ctrl-C keeps the best policy so far.
+    """Clones the optimal trajectory and the LQR around it into networks, one folder OUTPUT/clone_elbowsN_seedK a seed.
 
     Args:
-        algorithm: the algorithm.
         elbows: elbows on the table.
-        seed: of networks, sampling and arms.
-        output: folder for the policy, checkpoints and logs; runs/ALGORITHM_elbowsN_seedS when not given.
-        environment: more arguments of the environment as a JSON object, such as '{"energy_weight": 0.002}'.
-        checkpoint_every: control periods between two evaluations and checkpoints.
-        minutes: ends the training after so many.
-        ppo: the algorithm's settings.
+        seeds: how many networks.
+        first_seed: the first of the seeds.
+        output: folder of the runs.
+        trajectory: what is cloned; the benchmark's optimum for the elbow count when not given.
+        settings: of the imitation.
     """
-    from agents.keeper import sentence
-    from agents.train import train_ppo
+    from agents.cloning import clone_all
+    from agents.trajectory import OPTIMA
     from elbow_gym.settings import Settings
 
-    settings = Settings(**{"elbows": elbows, **json.loads(environment)})
-    folder = Path("runs") / f"{algorithm}_elbows{elbows}_seed{seed}" if output is None else output
-    print(f"{algorithm} with {elbows} elbows, seed {seed}, into {folder}: {asdict(ppo)}")
-    policy = train_ppo(settings, ppo, seed, folder, checkpoint_every, minutes)
-    figures = {key: value for key, value in policy.card.evaluation.items() if key != "seeds"}
-    print(f"best: {sentence(figures)}\n{folder / 'best.json'}")
+    chosen = list(range(first_seed, first_seed + seeds))
+    folders = [output / f"clone_elbows{elbows}_seed{seed}" for seed in chosen]
+    source = OPTIMA / f"elbows{elbows}.npz" if trajectory is None else trajectory
+    command = " ".join(["python -m agents", *sys.argv[1:]])
+    for result in clone_all(Settings(elbows=elbows), source, settings, chosen, folders, command).values():
+        print(f"{result['name']}: {result['training_seconds']:.0f} s, return {result['best']['return']:.2f}")
 
 
 @app.command
-def evaluate(policy: tyro.conf.Positional[str], /, elbows: int | None = None, episodes: int = 20) -> None:
+def publish(runs: tyro.conf.Positional[tuple[Path, ...]], /, replace_seeds: bool = False) -> None:
+    """Takes finished runs over: best policies into agents/policies, curves into benchmarks/results/learning.
+
+    Args:
+        runs: folders of the runs, as the training named them.
+        replace_seeds: also remove the shipped seeds of the same algorithm and task that are not among them.
+    """
+    from agents.publish import publish as publish_runs
+
+    for name in publish_runs(runs, replace_seeds=replace_seeds):
+        print(name)
+
+
+@app.command
+def evaluate(
+    policy: tyro.conf.Positional[str], /, elbows: int | None = None, env: str = "ElbowArm-v0", episodes: int = 20
+) -> None:
     """Plays a controller in the regimes A, B and C and prints what it cost.
 
     Args:
         policy: "pd", "pd_paper", "pd_smooth", "pd_gravity", "computed_torque", "computed_torque_posture", the algorithm
             of a shipped policy ("ppo"), or the path of a policy.
         elbows: elbows on the table; the policy's own, or 2, when not given.
+        env: the environment's id, unless the policy is a path.
         episodes: start poses, one fixed seed each.
     """
     from tqdm import tqdm
 
     from agents.evaluate import BENCHMARK_SEEDS, in_all_regimes, named_controller, print_results
 
-    settings, make = named_controller(policy, elbows)
+    settings, make = named_controller(policy, elbows, env)
     seeds = [BENCHMARK_SEEDS[0] + k for k in range(episodes)]
     with tqdm(total=200, unit="%", desc=policy, file=sys.stderr) as bar:
 
@@ -97,6 +111,54 @@ def evaluate(policy: tyro.conf.Positional[str], /, elbows: int | None = None, ep
 
         results = in_all_regimes(settings, make, seeds, advance)
     print_results(f"{policy}, elbows {settings.elbow_joints}, {episodes} episodes: mean ± standard deviation", results)
+
+
+@app.command
+def report(output: Path = Path("report.html")) -> None:
+    """One HTML file to look at: every controller's run to replay, the paper's Figs 1-25 and the benchmark.
+
+    Args:
+        output: the file; it opens without a network.
+    """
+    from agents.report import report as write_report
+
+    write_report(output)
+
+
+@app.command
+def watch(
+    controller: tyro.conf.Positional[str],
+    /,
+    versus: str | None = None,
+    elbows: int | None = None,
+    env: str = "ElbowArm-v0",
+    start: Literal["paper", "on_target"] = "paper",
+    seed: int = 0,
+    speed: float = 1.0,
+    size: tuple[int, int] = (640, 480),
+    output: Path | None = None,
+) -> None:
+    """Shows a controller at work in a window, in real time; without a display it writes a video instead.
+
+    Args:
+        controller: as for `evaluate`.
+        versus: another controller beside it, with the same start and in step.
+        elbows: elbows on the table; the environment's own number when not given.
+        env: id of the environment; a policy's file brings its own.
+        start: "paper": the paper's start pose; "on_target": the hand starts on the circle.
+        seed: of the start pose.
+        speed: seconds of the arm in one second.
+        size: width and height of each controller's picture in pixels.
+        output: a .gif or .mp4 to write instead of opening a window.
+    """
+    from agents.watch import watch as watch_controllers
+
+    names = [controller] if versus is None else [controller, versus]
+    written = watch_controllers(
+        names, env=env, elbows=elbows, start=start, seed=seed, speed=speed, size=size, output=output
+    )
+    if written is not None:
+        print(written)
 
 
 if __name__ == "__main__":

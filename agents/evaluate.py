@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,8 @@ from agents.metrics import REGIMES, UNITS, Regime, joint_energies, metrics
 from agents.pd import CLIPPED, UNLIMITED, PDController
 from agents.policy import Policy, load_policy, pair
 from agents.recording import record
+from agents.tasks import registered_arguments, task_settings
+from elbow_gym.conditions import TABLE_TIMESTEP
 from elbow_gym.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -70,21 +72,29 @@ def in_all_regimes(
     return results
 
 
-def named_controller(name: str, elbows: int | None) -> tuple[Settings, Callable[[ElbowArmVectorEnv], Controller]]:
+def named_controller(
+    name: str, elbows: int | None, env: str = "ElbowArm-v0"
+) -> tuple[Settings, Callable[[ElbowArmVectorEnv], Controller]]:
     """The environment and the maker of a controller by its name.
 
     Names: those of `CLASSICAL` ("pd" is the paper's clipped to 24 V and read at 2 kHz, "pd_paper" unlimited at 10 kHz),
-    an algorithm whose policy is shipped ("ppo"), or the path of a policy.
+    an algorithm whose policy is shipped ("ppo", its best seed), or the path of a policy, which brings its own `env`.
     """
-    count = 2 if elbows is None else elbows
     if name in CLASSICAL:
         arguments, make = CLASSICAL[name]
-        return Settings(elbows=count, **arguments), make
+        return settings_for(arguments, env, elbows), make
     is_path = pair(Path(name))[0].is_file()
-    policy = load_policy(name) if is_path else load_policy(name, elbows=count)
+    policy = load_policy(name) if is_path else load_policy(name, elbows=elbows, env=env)
     if elbows is not None and policy.settings.elbows != elbows:
         raise ValueError(f"elbows must be {policy.settings.elbows} as in the policy's training, got {elbows}")
     return policy.settings, policy_maker(policy)
+
+
+def settings_for(arguments: Mapping[str, Any], env: str, elbows: int | None = None) -> Settings:
+    """A registered environment with a classical controller's own arguments; a table asks for shorter RK4 steps."""
+    table = registered_arguments(env).get("table", False) is not False
+    shorter = {"timestep": min(TABLE_TIMESTEP, arguments["timestep"])} if table and "timestep" in arguments else {}
+    return task_settings(env, elbows, {**arguments, **shorter})
 
 
 def policy_maker(policy: Policy) -> Callable[[ElbowArmVectorEnv], Controller]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import platform
+import csv
+import math
+import multiprocessing
 import sys
 import time
-from dataclasses import asdict
-from importlib.metadata import version
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,40 +16,65 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
-from agents.files import write_whole
+from agents.checkpoint import save_checkpoint
+from agents.files import write_csv
+from agents.metered import MeteredVectorEnv
 from agents.metrics import metrics
-from agents.policy import Policy, policy_of
+from agents.policy import Policy, load_policy, pair, policy_of
 from agents.recording import record
+from agents.run import Run
 from elbow_gym.settings import Settings
 
 EVALUATION_SEEDS = tuple(range(10_000, 10_008))
 """Seeds that choose the best policy while it trains; the benchmark's own seeds are others."""
-PACKAGES = ("elbow-gym", "stable-baselines3", "torch", "gymnasium", "numpy", "numba")
+RANDOM_EVALUATION_SEEDS = tuple(range(10_000, 10_032))
+"""The same where arms and circles are drawn, and eight would be few."""
+COLUMNS = {
+    "steps": "-",
+    "training_seconds": "s",
+    "wall_seconds": "s",
+    "return": "-",
+    "electrical_energy": "J",
+    "drawn_energy": "J",
+    "steady_electrical_energy": "J",
+    "steady_error_rms_mm": "mm",
+    "error_mean_mm": "mm",
+}
+"""Of evaluations.csv: control periods, time that the training took without evaluations and checkpoints, time in all,
+and `evaluation`."""
 
 
 class Keeper(BaseCallback):
-    """Evaluates every so many control periods and keeps what was best by return.
+    """Evaluates every so many control periods, keeps what was best by return, and saves checkpoints by the clock.
 
     Args:
-        settings: the environment.
-        algorithm: the algorithm's settings, a dataclass.
-        seed: the run's.
-        folder: where `best.*` and `checkpoint.zip` go.
-        every: control periods between two evaluations.
-        minutes: ends the training after so many; None for no limit.
+        run: the run.
+        env: the batched environment under the model's.
+        progress: what the checkpoint that goes on holds; None for a new run.
+        position: of the progress bar on the terminal.
     """
 
     def __init__(
-        self, settings: Settings, algorithm: Any, seed: int, folder: Path, every: int, minutes: float | None
+        self, run: Run, env: MeteredVectorEnv, progress: Mapping[str, Any] | None = None, position: int = 0
     ) -> None:
         super().__init__()
-        self._settings, self._algorithm, self._seed = settings, algorithm, seed
-        self._folder, self._every, self._minutes = folder, every, minutes
-        self._started = time.monotonic()
-        self._evaluated = -1
-        self._best: Policy | None = None
-        self._best_return = -np.inf
-        self._bar = tqdm(total=algorithm.total_timesteps, unit="step", unit_scale=True, disable=None)
+        self._run, self._env, self._settings = run, env, Settings(**run.environment)
+        self._evaluated = -1 if progress is None else int(progress["evaluated"])
+        self._training = 0.0 if progress is None else float(progress["training_seconds"])
+        self._wall = 0.0 if progress is None else float(progress["wall_seconds"])
+        self._first = 0 if progress is None else int(progress["steps"])
+        self._now = self._saved = time.monotonic()
+        self._rows = [] if progress is None else read_evaluations(run.folder, self._first)
+        self._best = _best_so_far(run.folder) if progress is not None else None
+        self._bar = tqdm(
+            total=run.settings.total_timesteps,
+            initial=self._first,
+            desc=run.name,
+            position=position,
+            unit="step",
+            unit_scale=True,
+            disable=None,
+        )
 
     @property
     def best(self) -> Policy:
@@ -58,67 +83,148 @@ class Keeper(BaseCallback):
             raise RuntimeError("no policy was evaluated yet")
         return self._best
 
+    @property
+    def seconds(self) -> tuple[float, float]:
+        """Time that the training took without evaluations and checkpoints, and in all [s]."""
+        return self._training, self._wall
+
+    def tick(self, training: bool) -> None:
+        """Counts the time since the last call as training or not."""
+        now = time.monotonic()
+        self._wall += now - self._now
+        self._training += now - self._now if training else 0.0
+        self._now = now
+
+    def show(self, steps: int) -> None:
+        """Moves the progress bar."""
+        self._bar.update(steps - self._bar.n)
+
     def _on_step(self) -> bool:
-        return self._minutes is None or time.monotonic() - self._started < 60.0 * self._minutes
+        spent = self._wall + time.monotonic() - self._now
+        return self._run.minutes is None or spent < 60.0 * self._run.minutes
 
     def _on_rollout_start(self) -> None:
-        if self.num_timesteps // self._every > self._evaluated // self._every:
+        every = self._run.settings.evaluate_every
+        if self.num_timesteps // every > self._evaluated // every:
             self.evaluate(self.model)
-            write_whole(self._folder / "checkpoint.zip", self.model.save)
+        if time.monotonic() - self._saved > self._run.checkpoint_seconds:
+            parent = multiprocessing.parent_process()
+            if parent is not None and not parent.is_alive():
+                # Nobody waits for this seed any more, and whoever resumes it would train beside it.
+                raise KeyboardInterrupt
+            self.checkpoint(self.model)
 
     def _on_rollout_end(self) -> None:
-        self._bar.update(self.num_timesteps - self._bar.n)
+        self.show(self.num_timesteps)
+        # Less than an episode would show now its reach, now its tracking.
+        if self._env.metered_periods >= self._settings.horizon * self._env.num_envs:
+            for name, mean in self._env.read_meters().items():
+                # Rewards as an episode sums them up, next to its return.
+                scale = self._settings.horizon if name.startswith("reward") else 1.0
+                self.logger.record(f"rollout/{name}", scale * mean)
 
     def finish(self, model: BaseAlgorithm) -> None:
-        """The last evaluation, after the training or its interruption."""
+        """The last evaluation and checkpoint, after the training or its interruption."""
         self._bar.close()
         self.evaluate(model)
+        if model.num_timesteps < self._run.settings.total_timesteps:
+            # Stopped between an action and its outcome: whoever goes on starts new episodes.
+            model._last_obs = None
+        self.checkpoint(model)
+
+    def checkpoint(self, model: BaseAlgorithm) -> None:
+        """Saves all that a resumed run needs."""
+        self.tick(training=True)
+        progress = {
+            "steps": model.num_timesteps,
+            "evaluated": self._evaluated,
+            "training_seconds": self._training,
+            "wall_seconds": self._wall,
+        }
+        save_checkpoint(self._run.folder, model, model.get_env(), progress)
+        self.tick(training=False)
+        self._saved = self._now
 
     def evaluate(self, model: BaseAlgorithm) -> None:
         """Plays the deterministic policy on the evaluation seeds; says what came out and keeps the best."""
-        if self.num_timesteps == self._evaluated:
+        if model.num_timesteps == self._evaluated:
             return
-        self._evaluated = self.num_timesteps
-        seconds = time.monotonic() - self._started
-        policy = policy_of(
-            model,
-            self._settings,
-            command=" ".join(["python -m agents", *sys.argv[1:]]),
-            training={
-                **asdict(self._algorithm),
-                "seed": self._seed,
-                "timesteps": self.num_timesteps,
-                "seconds": round(seconds, 1),
-                "machine": f"{platform.machine()}, {os.cpu_count()} cores",
-            },
-            versions={name: version(name) for name in PACKAGES},
-        )
+        self.tick(training=True)
+        self._evaluated = model.num_timesteps
+        training = {"timesteps": model.num_timesteps, "seconds": round(self._training, 1)}
+        policy = policy_of(model, self._settings, **self._run.card(training))
         figures = evaluation(policy, self._settings)
         for name, value in figures.items():
             model.logger.record(f"evaluation/{name}", value)
-        tqdm.write(f"{self.num_timesteps:>9,d} steps, {seconds:4.0f} s: {sentence(figures)}")
-        if figures["return"] > self._best_return:
-            self._best_return = figures["return"]
-            policy.card.evaluation.update(figures, seeds=list(EVALUATION_SEEDS))
-            policy.save(self._folder / "best")
+        row = {"steps": model.num_timesteps, "training_seconds": self._training, "wall_seconds": self._wall, **figures}
+        self._rows.append([float(row[name]) for name in COLUMNS])
+        write_evaluations(self._run.folder, self._rows)
+        if self._best is None or figures["return"] > self._best.card.evaluation["return"]:
+            policy.card.evaluation.update(figures, seeds=list(evaluation_seeds(self._settings)))
+            policy.save(self._run.folder / "best")
             self._best = policy
+        self._say(model.num_timesteps, figures)
+        self.tick(training=False)
+
+    def _say(self, steps: int, figures: Mapping[str, float]) -> None:
+        if not self._bar.disable:
+            energy, error = figures["electrical_energy"], figures["steady_error_rms_mm"]
+            self._bar.set_postfix_str(f"{figures['return']:.1f}, {energy:.0f} J, {error:.1f} mm")
+            return
+        done = max(1, steps - self._first)
+        left = self._wall * (self._run.settings.total_timesteps - steps) / done if steps > self._first else math.nan
+        eta = f", {left / 60:.0f} min left" if left > 0.0 else ""
+        line = f"{self._run.name}: {steps:>9,d} steps, {self._training:4.0f} s{eta}: {sentence(figures)}"
+        print(line, file=sys.stdout, flush=True)
+
+
+def evaluation_seeds(settings: Settings) -> tuple[int, ...]:
+    """The seeds of an environment's evaluations."""
+    drawn = settings.randomization.ranges or settings.parsed_circle.random
+    return RANDOM_EVALUATION_SEEDS if drawn else EVALUATION_SEEDS
 
 
 def evaluation(policy: Policy, settings: Settings) -> dict[str, float]:
     """Means over the evaluation seeds, by name; "steady" counts the last 60 % of the episode, 2-5 s by default."""
-    recording = record(settings, lambda _: policy, EVALUATION_SEEDS)
+    recording = record(settings, lambda _: policy, evaluation_seeds(settings))
     whole, steady = metrics(recording), metrics(recording, 0.4 * recording.time[-1])
     return {
         "return": float(whole["return"].mean()),
         "electrical_energy": float(whole["electrical_energy"].mean()),
+        "drawn_energy": float(whole["drawn_energy"].mean()),
         "steady_electrical_energy": float(steady["electrical_energy"].mean()),
         "steady_error_rms_mm": float(np.sqrt((steady["error_rms"] ** 2).mean())),
+        "error_mean_mm": float(whole["error_mean"].mean()),
     }
 
 
-def sentence(figures: dict[str, float]) -> str:
+def sentence(figures: Mapping[str, float]) -> str:
     """The evaluation's figures in a line."""
     return (
         f"return {figures['return']:.2f}, {figures['electrical_energy']:.1f} J in all, "
         f"{figures['steady_electrical_energy']:.1f} J and {figures['steady_error_rms_mm']:.2f} mm rms when steady"
     )
+
+
+def write_evaluations(folder: Path, rows: Sequence[Sequence[float]]) -> None:
+    """Writes `folder`/evaluations.csv whole; rows hold `COLUMNS`."""
+    header = [f"{name} [{unit}]" for name, unit in COLUMNS.items()]
+    write_csv(folder / "evaluations.csv", header, ([f"{value:.10g}" for value in row] for row in rows))
+
+
+def read_evaluations(folder: Path, last: int) -> list[list[float]]:
+    """The rows of `folder`/evaluations.csv up to `last` control periods; later ones are measured again."""
+    path = folder / "evaluations.csv"
+    if not path.is_file():
+        return []
+    with path.open(newline="", encoding="utf-8") as handle:
+        rows = [[float(cell) for cell in row] for row in list(csv.reader(handle))[1:]]
+    return [row for row in rows if row[0] <= last]
+
+
+def _best_so_far(folder: Path) -> Policy | None:
+    try:
+        return load_policy(folder / "best") if pair(folder / "best")[0].is_file() else None
+    except ValueError:
+        # Killed between the two files of a save: what the checkpoint repeats writes them anew.
+        return None

@@ -28,7 +28,8 @@ class TimeVaryingLQR:
     """v = v_k - K_k (x - x_k) at period k, with x = (q, q_dot, current), clipped to the supply voltage.
 
     The gains minimise the reward's second-order expansion along the trajectory under the simulator's own linearised
-    control period. Periods are counted from the first call of `predict` on: make one controller per episode.
+    control period. Periods are counted from the first call of `predict` on: make one controller per episode, or
+    `restart` it.
 
     Args:
         env: the environment that it will act in, at the trajectory's control frequency.
@@ -60,6 +61,10 @@ class TimeVaryingLQR:
         voltage = self._voltage[k] - (state - self._states[k]) @ self.gains[k].T
         self._period += 1
         return np.clip(voltage / self._volts, -self._highest, self._highest).astype(np.float32), None
+
+    def restart(self) -> None:
+        """The next call of `predict` is an episode's start again."""
+        self._period = 0
 
 
 def linearised_periods(settings: Settings, trajectory: Trajectory) -> tuple[Array, Array]:

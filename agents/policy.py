@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.files import write_text, write_whole
+from agents.tasks import task_name
 from elbow_gym.env import ElbowArmEnv
 from elbow_gym.settings import Settings
-from elbow_gym.task import OBSERVATION_VERSION, ObservationLayout
+from elbow_gym.task import OBSERVATION_VERSION
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 SHIPPED = Path(__file__).parent / "policies"
 FORMAT = 1
-ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
+ACTIVATIONS = {
+    "tanh": np.tanh,
+    "relu": lambda x: np.maximum(x, 0.0),
+    "elu": lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0))),
+}
+OUTPUTS = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
+"""How the last layer becomes an action: PPO's is clipped, SAC's squashed."""
 
 Weights = dict[str, NDArray[np.float32]]
 
@@ -30,14 +38,21 @@ class PolicyCard:
 
     algorithm: str
     environment: dict[str, Any]
-    """`Settings` of the environment it was trained in, JSON types only."""
+    """`Settings` of the environment it was trained for, JSON types only."""
     observation: tuple[str, ...]
     """Names and units of the observation's entries."""
     layers: tuple[int, ...]
     """Sizes from observation to action."""
     activation: str
+    """Between the layers, one of `ACTIVATIONS`."""
     command: str
     """What made it."""
+    env: str = "ElbowArm-v0"
+    """Gymnasium's id of that environment."""
+    output: str = "clip"
+    """Of the last layer, one of `OUTPUTS`."""
+    digest: str = ""
+    """SHA-256 of the weights."""
     observation_version: int = OBSERVATION_VERSION
     format: int = FORMAT
     training: dict[str, Any] = field(default_factory=dict)
@@ -59,14 +74,18 @@ class Policy:
     def __init__(self, card: PolicyCard, weights: Mapping[str, NDArray[np.float32]]) -> None:
         if card.format != FORMAT:
             raise ValueError(f"format of the policy must be {FORMAT}, got {card.format}")
-        if card.activation not in ACTIVATIONS:
-            raise ValueError(f"activation must be one of {sorted(ACTIVATIONS)}, got {card.activation!r}")
+        for name, known in (("activation", ACTIVATIONS), ("output", OUTPUTS)):
+            if getattr(card, name) not in known:
+                raise ValueError(f"{name} must be one of {sorted(known)}, got {getattr(card, name)!r}")
         for k, (size, after) in enumerate(zip(card.layers[:-1], card.layers[1:], strict=True)):
             for name, shape in ((f"weight_{k}", (after, size)), (f"bias_{k}", (after,))):
                 if name not in weights or weights[name].shape != shape:
                     got = weights[name].shape if name in weights else "nothing"
                     raise ValueError(f"{name} must have shape {shape}, got {got}")
-        self.card = card
+        digest = digest_of(weights)
+        if card.digest not in ("", digest):
+            raise ValueError(f"weights must be those of the card, with the digest {card.digest}, got {digest}")
+        self.card = replace(card, digest=digest)
         self.weights: Weights = dict(weights)
 
     def check(self, env: ElbowArmEnv | ElbowArmVectorEnv) -> None:
@@ -104,7 +123,22 @@ class Policy:
         for k in range(last + 1):
             x = x @ self.weights[f"weight_{k}"].T + self.weights[f"bias_{k}"]
             x = activation(x) if k < last else x
-        return np.clip(x, -1.0, 1.0), None
+        return OUTPUTS[self.card.output](x).astype(np.float32, copy=False), None
+
+    def module(self) -> Any:
+        """The same as a `torch.nn.Sequential` that maps observations to actions, for whoever trains on."""
+        import torch
+
+        kinds = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU}
+        layers: list[Any] = []
+        for k, (size, after) in enumerate(zip(self.card.layers[:-1], self.card.layers[1:], strict=True)):
+            linear = torch.nn.Linear(size, after)
+            with torch.no_grad():
+                linear.weight.copy_(torch.from_numpy(self.weights[f"weight_{k}"]))
+                linear.bias.copy_(torch.from_numpy(self.weights[f"bias_{k}"]))
+            layers += [linear, kinds[self.card.activation]()]
+        layers[-1] = torch.nn.Tanh() if self.card.output == "tanh" else torch.nn.Hardtanh()
+        return torch.nn.Sequential(*layers)
 
     def save(self, path: Path) -> None:
         """Writes `path`.safetensors and `path`.json, each whole or not at all."""
@@ -115,15 +149,34 @@ class Policy:
         write_text(card, json.dumps(asdict(self.card), indent=2) + "\n")
 
 
-def load_policy(source: str | Path, elbows: int | None = None) -> Policy:
-    """A policy from a file (with or without suffix), or a shipped one: `load_policy("ppo", elbows=2)`.
+def digest_of(weights: Mapping[str, NDArray[np.float32]]) -> str:
+    """SHA-256 of the weights, name by name."""
+    digest = hashlib.sha256()
+    for name in sorted(weights):
+        digest.update(name.encode())
+        digest.update(np.ascontiguousarray(weights[name], dtype="<f4").tobytes())
+    return digest.hexdigest()
+
+
+def load_policy(
+    source: str | Path, elbows: int | None = None, env: str | None = None, seed: int | None = None
+) -> Policy:
+    """A policy from a file, or a shipped one: `load_policy("ppo", elbows=2)`, `load_policy("ppo", env="...")`.
+
+    Args:
+        source: a path with or without suffix; with `elbows` or `env` a shipped policy's algorithm.
+        elbows: elbows that it was trained with; those of `env` when None.
+        env: id of the environment that it was trained in; "ElbowArm-v0" when None.
+        seed: of its training; the one with the best return at its evaluation when None.
 
     Raises:
         ValueError: there is no such policy, or its files do not fit each other.
     """
     from safetensors.numpy import load_file
 
-    card_path, weights_path = pair(Path(source) if elbows is None else SHIPPED / f"{source}_elbows{elbows}")
+    shipped = elbows is not None or env is not None or seed is not None
+    path = shipped_path(f"{source}_{task_name(env or 'ElbowArm-v0', elbows)}", seed) if shipped else Path(source)
+    card_path, weights_path = pair(path)
     for needed in (card_path, weights_path):
         if not needed.is_file():
             raise ValueError(
@@ -137,6 +190,34 @@ def load_policy(source: str | Path, elbows: int | None = None) -> Policy:
     return Policy(card, load_file(weights_path))
 
 
+def shipped_path(name: str, seed: int | None = None) -> Path:
+    """Where a shipped policy of this algorithm and task stands, of the best seed unless one is given.
+
+    Raises:
+        ValueError: none is shipped.
+    """
+    seeds = shipped_seeds(name)
+    if not seeds or seed not in (None, *seeds):
+        known = sorted({path.rpartition("_seed")[0] for path in shipped_policies()})
+        raise ValueError(
+            f"policy must be one of {known}, got {name!r}"
+            if not seeds
+            else f"seed of {name} must be one of {seeds}, got {seed}"
+        )
+
+    def merit(k: int) -> float:
+        card = json.loads((SHIPPED / f"{name}_seed{k}.json").read_text(encoding="utf-8"))
+        return float(card["evaluation"]["return"])
+
+    return SHIPPED / f"{name}_seed{max(seeds, key=merit) if seed is None else seed}"
+
+
+def shipped_seeds(name: str) -> list[int]:
+    """Training seeds of the shipped policies of an algorithm and task, such as "ppo_elbows2"."""
+    stems = [path.rpartition("_seed") for path in shipped_policies()]
+    return sorted(int(seed) for known, _, seed in stems if known == name)
+
+
 def pair(path: Path) -> tuple[Path, Path]:
     """The card's and the weights' file of a policy named with or without either's suffix."""
     stem = path.with_suffix("") if path.suffix in (".json", ".safetensors") else path
@@ -144,15 +225,23 @@ def pair(path: Path) -> tuple[Path, Path]:
 
 
 def shipped_policies() -> list[str]:
-    """Names of the policies that come with the project."""
+    """Names of the policies that come with the project, such as "ppo_elbows2_seed0"."""
     return sorted(path.stem for path in SHIPPED.glob("*.json"))
 
 
-def policy_of(model: Any, settings: Settings, command: str, **more: dict[str, Any]) -> Policy:
-    """The deterministic actor of an SB3 on-policy model as a `Policy`. `settings` must hold JSON types only."""
+def policy_of(model: Any, settings: Settings, command: str, env: str = "ElbowArm-v0", **more: dict[str, Any]) -> Policy:
+    """The deterministic actor of an SB3 model (PPO's or SAC's kind) as a `Policy`.
+
+    Args:
+        model: with the `SB3VecEnv` that it was trained in.
+        settings: the environment's, JSON types only.
+        command: what made it.
+        env: the environment's id.
+        more: further fields of the card.
+    """
     import torch
 
-    actor = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
+    actor = actor_layers(model)
     linear = [layer for layer in actor if isinstance(layer, torch.nn.Linear)]
     kinds = {type(layer).__name__.lower() for layer in actor} - {"linear"}
     if len(kinds) != 1:
@@ -161,14 +250,22 @@ def policy_of(model: Any, settings: Settings, command: str, **more: dict[str, An
     for k, layer in enumerate(linear):
         weights[f"weight_{k}"] = layer.weight.detach().cpu().numpy().copy()
         weights[f"bias_{k}"] = layer.bias.detach().cpu().numpy().copy()
-    layout = ObservationLayout(settings.parsed_arm.n_joints)
     card = PolicyCard(
         algorithm=type(model).__name__.lower(),
         environment=json.loads(json.dumps(settings.arguments)),
-        observation=layout.names,
+        observation=tuple(model.get_env().get_attr("observation_names", 0)[0]),
         layers=(linear[0].in_features, *(layer.out_features for layer in linear)),
         activation=kinds.pop(),
         command=command,
+        env=env,
+        output="tanh" if hasattr(model.policy, "actor") else "clip",
         **{name: json.loads(json.dumps(value)) for name, value in more.items()},
     )
     return Policy(card, weights)
+
+
+def actor_layers(model: Any) -> list[Any]:
+    """The torch layers from the observation to the mean action of an SB3 model of PPO's or SAC's kind."""
+    if hasattr(model.policy, "actor"):
+        return [*model.policy.actor.latent_pi, model.policy.actor.mu]
+    return [*model.policy.mlp_extractor.policy_net, model.policy.action_net]

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +17,7 @@ from agents.pd import CLIPPED, UNLIMITED, PDController
 from agents.recording import Recording, record
 from agents.style import ELBOW_NAMES
 from agents.verdict import Claim, Numbers, as_markdown, verdict
+from agents.workers import Job, in_processes
 from elbow_gym.parameters import as_elbows
 from elbow_gym.settings import Settings
 
@@ -161,49 +160,9 @@ def case_numbers(runs: Mapping[str, Mapping[str, Any]]) -> Numbers:
     return Numbers(**runs["paper"], energy_on_target=runs["on target"]["energy"], energy_clipped=runs["24 V"]["energy"])
 
 
-_parent: Any = None
-
-
-def _meet_parent(ticks: Any, stop: Any) -> None:
-    """Runs once in each worker: keeps the pipe for its progress and the event that ends it."""
-    global _parent  # noqa: PLW0603
-    _parent = ticks, stop
-
-
-def _play_in_worker(settings: Settings) -> Played:
-    ticks, stop = _parent
-
-    def tell(periods: int) -> None:
-        if stop.is_set():
-            raise InterruptedError("another run failed or was interrupted")
-        ticks.put(periods)
-
-    return play(settings, tell)
-
-
 def play_all(jobs: Mapping[Any, Settings], progress: Callable[[int], Any]) -> dict[Any, Played]:
-    """`play` for every job on as many processes as there are cores; a run is Python and takes a core to itself."""
-    # A forked copy of a parent with threads may hang, so workers start afresh.
-    context = multiprocessing.get_context("spawn")
-    ticks, stop = context.SimpleQueue(), context.Event()
-    workers = min(os.cpu_count() or 1, len(jobs))
-    with ProcessPoolExecutor(workers, context, _meet_parent, (ticks, stop)) as pool:
-        # The longest first, so that no core idles at the end.
-        longest = sorted(jobs, key=lambda key: -jobs[key].horizon)
-        futures = {key: pool.submit(_play_in_worker, jobs[key]) for key in longest}
-        unfinished = set(futures.values())
-        try:
-            while unfinished:
-                finished, unfinished = wait(unfinished, timeout=0.1, return_when=FIRST_EXCEPTION)
-                for future in finished:
-                    future.result()
-                while not ticks.empty():
-                    progress(ticks.get())
-        except BaseException:
-            stop.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    return {key: future.result() for key, future in futures.items()}
+    """`play` for every job, each in a process of its own."""
+    return in_processes({key: Job(partial(play, jobs[key]), jobs[key].horizon) for key in jobs}, progress)
 
 
 class Quantity(NamedTuple):

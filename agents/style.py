@@ -18,6 +18,10 @@ CONTROLLER_COLOURS = {
     "lqr": "#000000",
     "ppo": "#0072B2",
     "sac": "#009E73",
+    "ppo_cloned": "#7FB2D8",
+    "ppo_random": "#00395B",
+    "sac_cloned": "#80CEB9",
+    "sac_random": "#005A41",
 }
 CONTROLLER_NAMES = {
     "pd_paper": "PD, no limit",
@@ -29,6 +33,10 @@ CONTROLLER_NAMES = {
     "lqr": "LQR on the optimum",
     "ppo": "PPO, 24 V",
     "sac": "SAC, 24 V",
+    "ppo_cloned": "PPO from the optimum's clone",
+    "ppo_random": "PPO, drawn arms and circles",
+    "sac_cloned": "SAC from the optimum's clone",
+    "sac_random": "SAC, drawn arms and circles",
 }
 CONTROLLER_MARKERS = {
     "pd_paper": "v",
@@ -40,6 +48,10 @@ CONTROLLER_MARKERS = {
     "lqr": "*",
     "ppo": "X",
     "sac": "h",
+    "ppo_cloned": ">",
+    "ppo_random": "<",
+    "sac_cloned": "p",
+    "sac_random": "H",
 }
 
 

@@ -1,4 +1,4 @@
-"""The command line: `python -m benchmarks energy | optimal | speed`."""
+"""The command line: `python -m benchmarks energy | learning | optimal | speed`."""
 
 from __future__ import annotations
 
@@ -13,16 +13,32 @@ app = tyro.extras.SubcommandApp()
 
 
 @app.command
-def energy(output: Path = RESULTS, episodes: int = 20) -> None:
-    """Every controller in the regimes A, B and C: table, CSV, JSON and a figure.
+def energy(output: Path = RESULTS, episodes: int = 20, fresh: bool = False) -> None:
+    """Every controller in the regimes A, B and C: tables, CSV, JSON and figures.
+
+    An interrupted run goes on where it stopped: what was measured with the same code and files is not measured again.
 
     Args:
         output: folder for the results.
         episodes: start poses, one fixed seed each.
+        fresh: measure everything again.
     """
     from benchmarks.energy import energy as measure_energy
 
-    measure_energy(output, episodes)
+    measure_energy(output, episodes, fresh)
+
+
+@app.command
+def learning(output: Path = RESULTS) -> None:
+    """The learning curves against steps and seconds, and when the PD was beaten: figure, CSV and table.
+
+    Args:
+        output: folder of the results, with the curves in learning/ and energy.csv.
+    """
+    from benchmarks.learning import save
+
+    for row in save(output):
+        print("  ".join(row))
 
 
 @app.command

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
+from agents.files import write_csv
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES, ELBOW_COLOURS, ELBOW_NAMES, pyplot
 from benchmarks.optimal import cached, cells
+
+if TYPE_CHECKING:
+    from benchmarks.energy import Row
 
 
 class Mark(NamedTuple):
@@ -17,6 +21,41 @@ class Mark(NamedTuple):
     elbows: int
     error: float
     energy: float
+    gain: float = 1.0
+    """Of the PD, times the paper's."""
+
+
+def marks(rows: Sequence[Row]) -> list[Mark]:
+    """Every controller's place beside the front."""
+    return [
+        Mark(
+            row.controller,
+            row.elbows,
+            row.figures["error_mean"].value,
+            row.figures["electrical_energy"].value,
+            row.gain,
+        )
+        for row in rows
+        if row.regime == "A"
+    ]
+
+
+def gain_family(places: Sequence[Mark], elbows: int) -> list[Mark]:
+    """The paper's PD at 24 V with all its gains, softest first; empty when only the paper's were played."""
+    family = sorted((m for m in places if m.controller == "pd_24v" and m.elbows == elbows), key=lambda m: m.gain)
+    return family if len(family) > 1 else []
+
+
+def write_gains(places: Sequence[Mark], path: Path) -> None:
+    """Writes the PD's place for every gain."""
+    header = ["elbows", "gain [-]", "error_mean [mm]", "electrical_energy [J]"]
+    counts = sorted({mark.elbows for mark in places}, reverse=True)
+    rows = [
+        [mark.elbows, f"{mark.gain:g}", f"{mark.error:.6g}", f"{mark.energy:.6g}"]
+        for elbows in counts
+        for mark in gain_family(places, elbows)
+    ]
+    write_csv(path, header, rows)
 
 
 def front(elbows: int) -> list[tuple[float, float]]:
@@ -26,18 +65,23 @@ def front(elbows: int) -> list[tuple[float, float]]:
     return sorted(points)
 
 
-def figure(marks: Sequence[Mark], path: Path) -> None:
+def figure(places: Sequence[Mark], path: Path) -> None:
     """One panel per elbow count: the front as a line, the controllers as marks, on logarithmic axes."""
     plt = pyplot()
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-    counts = sorted({mark.elbows for mark in marks}, reverse=True)
+    counts = sorted({mark.elbows for mark in places}, reverse=True)
     fig, axes = plt.subplots(1, len(counts), figsize=(10, 4.4), squeeze=False, layout="constrained")
     for ax, elbows in zip(axes[0], counts, strict=True):
         points = front(elbows)
         if points:
             ax.plot(*zip(*points, strict=True), "-", color=ELBOW_COLOURS[elbows], marker=".", label="optimal front")
-        for mark in (mark for mark in marks if mark.elbows == elbows):
+        family = gain_family(places, elbows)
+        if family:
+            line = [(mark.error, mark.energy) for mark in family]
+            colour = CONTROLLER_COLOURS["pd_24v"]
+            ax.plot(*zip(*line, strict=True), ":", color=colour, marker=".", label="PD, 24 V, gains x 1/4 to 4")
+        for mark in (mark for mark in places if mark.elbows == elbows and mark.gain == 1.0):
             ax.plot(
                 mark.error,
                 mark.energy,

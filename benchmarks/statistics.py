@@ -21,17 +21,22 @@ class Estimate(NamedTuple):
 
 
 def interquartile_mean(samples: ArrayLike) -> Estimate:
-    """Mean of the middle half of the samples (runs x episodes, flattened), with a percentile bootstrap interval.
+    """Mean of the middle half of the samples, with a percentile bootstrap interval.
 
-    The resampling is seeded, so the same samples give the same figures. NaN samples give NaN.
+    Samples of several training seeds, (seeds, episodes), count together; a resampling draws seeds first and then
+    episodes within each, since episodes of one policy are not independent. The resampling is seeded, so the same
+    samples give the same figures. NaN samples give NaN.
     """
-    flat = np.asarray(samples, dtype=np.float64).ravel()
+    rows = np.atleast_2d(np.asarray(samples, dtype=np.float64))
+    flat = rows.ravel()
     if flat.size == 0:
         raise ValueError("samples must hold at least one value, got none")
     value = float(stats.trim_mean(flat, 0.25))
     if flat.size == 1 or np.ptp(flat) == 0.0 or np.isnan(flat).any():
         return Estimate(value, value, value)
-    draws = np.random.default_rng(0).choice(flat, size=(RESAMPLES, flat.size))
-    means = stats.trim_mean(draws, 0.25, axis=1)
+    rng, (seeds, episodes) = np.random.default_rng(0), rows.shape
+    chosen = rng.integers(seeds, size=(RESAMPLES, seeds))
+    draws = rows[chosen[..., None], rng.integers(episodes, size=(RESAMPLES, seeds, episodes))]
+    means = stats.trim_mean(draws.reshape(RESAMPLES, -1), 0.25, axis=1)
     low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
     return Estimate(value, float(low), float(high))

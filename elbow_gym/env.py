@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from elbow_gym.episodes import Episodes
 from elbow_gym.parameters import ArmParameters, Array, non_negative
 from elbow_gym.settings import Settings
+from elbow_gym.viewer import RENDER_MODES, Viewer
 
 
 def action_space(episodes: Episodes) -> spaces.Space[NDArray[np.float32]]:
@@ -120,6 +121,9 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | payload | 0.0 | mass at the hand [kg] |
     | randomize | None | dict of ranges drawn anew at each reset, see `elbow_gym.randomization` |
 
+    Beside them `render_mode` ("rgb_array" or "human", None by default), `render_width` (640) and `render_height` (480)
+    choose the picture.
+
     `info` holds tracking_error [m], electrical_power [W], electrical_energy, drawn_energy and link_work [J] since the
     reset, reward_tracking, reward_energy, voltage [V], elbow_force [N] and below_table [s].
 
@@ -132,7 +136,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     * v0: first version.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 50}
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}
 
     def __init__(
         self,
@@ -140,15 +144,16 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         elbows: int | tuple[int, ...] = 2,
         arm: str | ArmParameters | Mapping[str, Any] = "paper",
         render_mode: str | None = None,
+        render_width: int = 640,
+        render_height: int = 480,
         **settings: Any,
     ) -> None:
-        if render_mode is not None:
-            raise ValueError(f"render_mode must be one of {self.metadata['render_modes']} or None, got {render_mode!r}")
-        self.render_mode = None
+        self.render_mode = render_mode
         self._episodes = Episodes(Settings(elbows=elbows, arm=arm, **settings))
         self.metadata = {**self.metadata, "render_fps": round(self.settings.control_frequency)}
         self.action_space = action_space(self._episodes)
         self.observation_space = observation_space(self._episodes)
+        self._viewer = Viewer(self._episodes, render_mode, render_width, render_height)
         self._ready = False
 
     @property
@@ -190,6 +195,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._np_random, self._np_random_seed = before
             raise
         self._ready = True
+        self._viewer.restart()
         sight = self._episodes.look()
         return sight.observation[0], single(self._episodes.info(sight))
 
@@ -199,6 +205,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise gym.error.ResetNeeded("reset must be called before step")
         array = as_action(action, (self._episodes.arm.n_joints,))
         outcome = self._episodes.step(array[None])
+        self._viewer.follow()
         return (
             outcome.observation[0],
             outcome.reward.item(),
@@ -206,6 +213,19 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             outcome.truncated.item(),
             single(outcome.info),
         )
+
+    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """A fresh picture (height, width, 3) in the mode "rgb_array"; None in "human", where steps show it in a window.
+
+        Needs pygame-ce, which `pip install "elbow-gym[render]"` brings; "rgb_array" needs no display. Changes neither
+        the arm nor its random numbers.
+        """
+        pictures = self._viewer.render(self._ready)
+        return None if pictures is None else pictures[0]
+
+    def close(self) -> None:
+        """Takes the window away, if there is one. May be called twice."""
+        self._viewer.close()
 
     def get_state(self) -> dict[str, Any]:
         """Everything that runs on, the random generator included."""
@@ -219,6 +239,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._episodes.set_state(state["episodes"], [self.np_random])
         self.np_random.bit_generator.state = state["generator"]
         self._ready = True
+        self._viewer.restart()
 
 
 def single(info: Mapping[str, Any]) -> dict[str, Any]:

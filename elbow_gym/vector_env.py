@@ -16,6 +16,7 @@ from elbow_gym.env import ElbowArmEnv, action_space, as_action, observation_spac
 from elbow_gym.episodes import Episodes
 from elbow_gym.parameters import ArmParameters, Array, non_negative
 from elbow_gym.settings import Settings
+from elbow_gym.viewer import Viewer
 
 Flags = NDArray[np.bool_]
 
@@ -29,6 +30,8 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         num_envs: the number of arms.
         autoreset_mode: "NextStep", "SameStep" or "Disabled" (then reset with `options={"reset_mask": ...}`).
         num_threads: threads over which blocks of arms are spread; the results do not depend on it.
+
+    In the render mode "human" a window shows the first four arms.
     """
 
     metadata: dict[str, Any] = {**ElbowArmEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -42,17 +45,18 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         num_threads: int = 1,
         render_mode: str | None = None,
+        render_width: int = 640,
+        render_height: int = 480,
         **settings: Any,
     ) -> None:
-        if render_mode is not None:
-            raise ValueError(f"render_mode must be one of {self.metadata['render_modes']} or None, got {render_mode!r}")
         modes = [mode.value for mode in AutoresetMode]
         if autoreset_mode not in [*AutoresetMode, *modes]:
             raise ValueError(f"autoreset_mode must be one of {modes}, got {autoreset_mode!r}")
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self._episodes = Episodes(Settings(elbows=elbows, arm=arm, **settings), num_envs, num_threads)
         self.num_envs = num_envs
-        self.render_mode = None
+        self.render_mode = render_mode
+        self._viewer = Viewer(self._episodes, render_mode, render_width, render_height)
         self.metadata = {
             **self.metadata,
             "autoreset_mode": self.autoreset_mode,
@@ -151,6 +155,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             raise
         self._over[chosen] = False
         self._started[chosen] = True
+        self._viewer.restart(chosen)
         sight = self._episodes.look(~chosen)
         return sight.observation, masked(self._episodes.info(sight), chosen)
 
@@ -170,6 +175,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
                 f"reset must be called with options['reset_mask'] for arms that are over, got {np.flatnonzero(waiting)}"
             )
         outcome = self._episodes.step(array, waiting if some_wait else None)
+        self._viewer.follow()
         over = outcome.terminated | outcome.truncated
         if not some_wait and not over.any():
             everyone = np.ones(self.num_envs, dtype=np.bool_)
@@ -180,6 +186,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         if some_wait:
             # Arms that ended a step ago start anew instead; what they did meanwhile does not count.
             self._episodes.reset(self._generators, waiting)
+            self._viewer.restart(waiting)
             sight = self._episodes.look(~waiting)
             info = self._episodes.info(sight)
             outcome.observation[waiting] = sight.observation[waiting]
@@ -196,6 +203,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         for i in np.flatnonzero(over):
             final_obs[i] = outcome.observation[i].copy()
         self._episodes.reset(self._generators, over)
+        self._viewer.restart(over)
         sight = self._episodes.look(~over)
         info = self._episodes.info(sight)
         outcome.observation[over] = sight.observation[over]
@@ -209,6 +217,14 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         infos.update(final_obs=final_obs, _final_obs=over.copy(), final_info=masked(final_info, over))
         infos["_final_info"] = over.copy()
         return (*outcome[:4], infos)
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Fresh pictures (height, width, 3) of all arms in the mode "rgb_array"; None in "human". See `ElbowArmEnv`."""
+        return self._viewer.render(bool(self._started.all()))
+
+    def close_extras(self, **_kwargs: Any) -> None:
+        """Takes the window away, if there is one."""
+        self._viewer.close()
 
     def get_state(self) -> dict[str, Any]:
         """Everything that runs on, the random generators included."""
@@ -231,6 +247,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             generator.bit_generator.state = saved
         self._over = np.array(state["over"], dtype=np.bool_)
         self._started = np.array(state["started"], dtype=np.bool_)
+        self._viewer.restart()
 
 
 def spread(mask: Flags, rows: Array) -> Flags:

@@ -3,7 +3,6 @@
 import csv
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +11,15 @@ from agents.evaluate import SHIFTED
 from agents.metrics import REGIMES, UNITS
 from agents.pd import CLIPPED, PDController
 from agents.recording import record
-from benchmarks import energy
+from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES
+from benchmarks import cache, energy, lineup, pareto
+from benchmarks.lineup import Cell
+from benchmarks.optimal import RESULTS
 from benchmarks.statistics import interquartile_mean
 from elbow_gym.settings import Settings
+from elbow_gym.vector_env import ElbowArmVectorEnv
+
+STYLES = (CONTROLLER_COLOURS, CONTROLLER_NAMES, CONTROLLER_MARKERS)
 
 
 def test_interquartile_mean_drops_the_outer_quarters():
@@ -37,29 +42,111 @@ def test_equal_or_single_samples_have_no_spread_and_none_are_refused():
         interquartile_mean([])
 
 
-def test_benchmark_writes_table_figure_and_context(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(energy, "cells", lambda: [("pd_24v", 2), ("ppo", 2)])
-    rows = energy.energy(tmp_path, episodes=2)
-    assert [row.regime for row in rows] == ["A", "B", "C"] * 2 + ["A", "B"] * 2
-    assert [row.shifted for row in rows] == [False] * 6 + [True] * 4
-    written_files = ["energy.csv", "energy.json", "energy.md", "energy.png"]
-    written_files += ["energy_shifted.csv", "energy_shifted.md", "pareto.png"]
-    assert sorted(path.name for path in tmp_path.iterdir()) == written_files
-    with (tmp_path / "energy.csv").open() as handle:
+def test_interval_of_few_seeds_is_wider_than_that_of_their_episodes():
+    seeds = np.repeat([[1.0], [2.0], [3.0], [4.0]], 50, axis=1)
+    together, apart = interquartile_mean(seeds), interquartile_mean(seeds.ravel())
+    assert together.value == apart.value == pytest.approx(2.5)
+    assert together.high - together.low > 3.0 * (apart.high - apart.low)
+
+
+QUICK = [Cell("ppo", 2), Cell("ppo", 2, "shifted"), Cell("computed_torque", 0, "table")]
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("energy")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(energy, "cells", lambda: QUICK)
+        patch.setattr(energy, "sweep", list)
+        rows = energy.energy(folder, episodes=2, folder=folder / "cache")
+    return folder, rows
+
+
+def test_benchmark_writes_tables_figures_and_context(measured):
+    folder, rows = measured
+    assert [row.regime for row in rows] == ["A", "B", "C", "A", "B", "A", "B", "C"]
+    assert [row.part for row in rows] == ["nominal"] * 3 + ["shifted"] * 2 + ["table"] * 3
+    stems = ("energy", "energy_shifted", "energy_table")
+    expected = {f"{stem}.{suffix}" for stem in stems for suffix in ("csv", "md")}
+    expected |= {"energy.json", "energy.png", "energy_joints.png", "energy_seeds.csv", "pareto.png", "pareto_gains.csv"}
+    assert {path.name for path in folder.iterdir()} == expected | {"cache"}
+    with (folder / "energy.csv").open() as handle:
         written = list(csv.DictReader(handle))
     assert float(written[0]["electrical_energy [J]"]) == pytest.approx(
         sum(float(written[0][f"electrical_energy_joint_{k} [J]"]) for k in range(1, 11)), rel=0.05
     )
-    assert json.loads((tmp_path / "energy.json").read_text())["seeds"] == [20_000, 20_001]
-    assert "PD, 24 V" in capsys.readouterr().out
+    assert int(written[0]["training_seeds [-]"]) == len(lineup.shipped_seeds("ppo_elbows2"))
+    assert json.loads((folder / "energy.json").read_text())["seeds"] == [20_000, 20_001]
+    with (folder / "energy_seeds.csv").open() as handle:
+        assert {row["seed"] for row in csv.DictReader(handle)} == {
+            str(seed) for seed in lineup.shipped_seeds("ppo_elbows2")
+        }
 
 
-def test_gap_is_the_excess_over_the_bound_where_there_is_one(monkeypatch):
-    monkeypatch.setattr(energy, "bound", lambda elbows, regime: 20.0 if regime.name == "A" else None)
-    figures = {"return": interquartile_mean([-30.0])}
-    assert energy.gap(energy.Row("pd_24v", 2, "A", figures, ())) == pytest.approx(0.5)
-    assert energy.gap(energy.Row("pd_24v", 2, "B", figures, ())) is None
-    assert energy.gap(energy.Row("pd_24v", 2, "A", figures, (), shifted=True)) is None
+def test_interrupted_benchmark_goes_on(measured, monkeypatch):
+    folder, rows = measured
+    cache_folder = folder / "cache"
+    again = energy.rows_of(QUICK[0], [20_000, 20_001], cache_folder)
+    assert again == rows[:3]
+    monkeypatch.setattr(energy, "in_all_regimes", lambda *_, **__: pytest.fail("measured again"))
+    assert energy.rows_of(QUICK[0], [20_000, 20_001], cache_folder) == rows[:3]
+    for change in ({"seeds": [20_000, 20_002]}, {"fresh": True}):
+        with pytest.raises(pytest.fail.Exception, match="measured again"):
+            energy.rows_of(**{"cell": QUICK[0], "seeds": [20_000, 20_001], "folder": cache_folder, **change})
+    monkeypatch.setattr(cache, "code", lambda: "other code")
+    with pytest.raises(pytest.fail.Exception, match="measured again"):
+        energy.rows_of(QUICK[0], [20_000, 20_001], cache_folder)
+
+
+def test_gap_is_the_excess_over_the_bound_where_there_is_one(measured, monkeypatch):
+    folder, _ = measured
+    monkeypatch.setattr(energy, "cached_bound", lambda _: {"closed_loop": 20.0})
+    whole, late, on_target = energy.rows_of(QUICK[0], [20_000, 20_001], folder / "cache")
+    assert whole.gap == pytest.approx(-whole.figures["return"].value / 20.0 - 1.0)
+    assert on_target.gap is not None
+    assert late.gap is None
+    assert all(row.gap is None for row in energy.rows_of(QUICK[1], [20_000, 20_001], folder / "cache"))
+
+
+def test_lineup_finds_what_is_shipped(monkeypatch):
+    names = [
+        "ppo_elbows2_seed0",
+        "ppo_elbows2_seed3",
+        "ppo_cloned_elbows0_seed1",
+        "sac_random_seed0",
+        "ppo_table_seed2",
+    ]
+    monkeypatch.setattr(lineup, "shipped_policies", lambda: names)
+    nominal = {
+        Cell("ppo", 2): "ppo_elbows2",
+        Cell("ppo_cloned", 0): "ppo_cloned_elbows0",
+        Cell("sac_random", 2): "sac_random",
+    }
+    shifted = {replace(cell, part="shifted"): name for cell, name in nominal.items()}
+    assert lineup.learned() == {**nominal, **shifted, Cell("ppo", 0, "table"): "ppo_table"}
+    everyone = lineup.cells()
+    assert {cell.controller for cell in everyone if cell.part == "table"} >= {"ppo", "pd_24v", "computed_torque"}
+    assert len(everyone) == len(set(everyone))
+    assert all(name in style for cell in everyone for name in [cell.controller] for style in STYLES)
+
+
+def test_table_part_is_played_on_the_table_and_the_random_policy_off_it():
+    [player] = lineup.contenders(Cell("pd_24v", 0, "table"))
+    assert player.settings.table is True
+    assert player.settings.elbows == 0
+    [player] = lineup.contenders(Cell("pd_24v", 1, gain=4.0))
+    controller = player.make(ElbowArmVectorEnv(1, **player.settings.arguments))
+    assert (controller.kp, controller.kd) == (4.0 * 500.0, 4.0 * 20.0)
+
+
+def test_gain_family_runs_from_soft_to_stiff(tmp_path):
+    figures = {"error_mean": interquartile_mean([1.0]), "electrical_energy": interquartile_mean([2.0])}
+    rows = [energy.Row("pd_24v", 2, "A", figures, (), gain=gain) for gain in (1.0, 4.0, 0.25)]
+    rows += [energy.Row("ppo", 2, "A", figures, ()), energy.Row("pd_24v", 2, "B", figures, ())]
+    places = pareto.marks(rows)
+    assert [mark.gain for mark in pareto.gain_family(places, 2)] == [0.25, 1.0, 4.0]
+    pareto.write_gains(places, tmp_path / "gains.csv")
+    assert len((tmp_path / "gains.csv").read_text().splitlines()) == 4
 
 
 def test_lqr_stays_within_five_percent_of_the_bound_at_every_elbow_count():
@@ -70,17 +157,18 @@ def test_lqr_stays_within_five_percent_of_the_bound_at_every_elbow_count():
 
 
 def committed():
-    with (Path(energy.__file__).parent / "results/energy.csv").open() as handle:
+    with (RESULTS / "energy.csv").open() as handle:
         return list(csv.DictReader(handle))
 
 
 def test_committed_results_hold_every_cell_and_regime():
     found = {(row["controller"], int(row["elbows"]), row["regime"]) for row in committed()}
-    assert found == {(name, elbows, regime.name) for name, elbows in energy.cells() for regime in REGIMES}
+    nominal = [cell for cell in lineup.cells() if cell.part == "nominal"]
+    assert found == {(cell.controller, cell.elbows, regime.name) for cell in nominal for regime in REGIMES}
 
 
 def test_committed_table_is_made_of_the_committed_figures():
-    lines = (energy.RESULTS / "energy.md").read_text().splitlines()[2:]
+    lines = (RESULTS / "energy.md").read_text().splitlines()[2:]
     for line, row in zip(lines, committed(), strict=True):
         cells = [cell.strip() for cell in line.strip("|").split("|")]
         value = float(row["electrical_energy [J]"])
@@ -94,9 +182,10 @@ def test_shifted_set_asks_for_what_the_nominal_one_does_not_have():
     assert shifted.start_noise > nominal.start_noise
     assert {"radius", "period", "phase"} <= set(shifted.parsed_circle.drawn)
     assert shifted.randomization.lowest("payload") > nominal.payload
-    with (energy.RESULTS / "energy_shifted.csv").open() as handle:
+    with (RESULTS / "energy_shifted.csv").open() as handle:
         found = {(row["controller"], int(row["elbows"]), row["regime"]) for row in csv.DictReader(handle)}
-    assert found == {(name, elbows, regime) for name, elbows in energy.shifted_cells() for regime in "AB"}
+    shifted = [cell for cell in lineup.cells() if cell.part == "shifted"]
+    assert found == {(cell.controller, cell.elbows, regime) for cell in shifted for regime in "AB"}
 
 
 def test_pd_on_drawn_circles_tracks_each_arms_own():

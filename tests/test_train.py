@@ -1,56 +1,230 @@
-"""Training runs end to end on a small budget, keeps the best policy, and survives an interruption."""
+"""Training runs end to end on a small budget, keep the best policy, and survive interruption and kill -9."""
 
+import csv
 import json
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 from stable_baselines3 import PPO
 
-from agents.keeper import Keeper
+from agents.algorithms import PPOSettings, SACSettings
+from agents.checkpoint import checkpoints
+from agents.keeper import COLUMNS, Keeper
 from agents.policy import load_policy
-from agents.train import PPOSettings, train_ppo
+from agents.run import Run
+from agents.train import train, train_all
 from elbow_gym.settings import Settings
 
-SMALL = PPOSettings(total_timesteps=512, num_envs=4, n_steps=64, batch_size=64, n_epochs=1, hidden=(8,))
+SMALL = PPOSettings(
+    total_timesteps=1024, num_envs=4, n_steps=64, batch_size=64, n_epochs=1, hidden=(8,), evaluate_every=256
+)
+
+
+def small_run(folder, **changes):
+    environment = json.loads(json.dumps(Settings(duration=1.0, start="on_target").arguments))
+    return Run(
+        **{"algorithm": "ppo", "environment": environment, "settings": SMALL, "seed": 0, "folder": folder} | changes
+    )
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("run")
-    return folder, train_ppo(Settings(duration=1.0, start="on_target"), SMALL, 0, folder, checkpoint_every=256)
+def done(tmp_path_factory):
+    run = small_run(tmp_path_factory.mktemp("whole") / "run", checkpoint_seconds=0.0)
+    return run, train(run)
+
+
+def weights(folder):
+    return load_policy(folder / "best").weights
+
+
+def evaluations(folder):
+    with (folder / "evaluations.csv").open() as handle:
+        return [[float(cell) for cell in row] for row in list(csv.reader(handle))[1:]]
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::PendingDeprecationWarning")
-class TestRun:
-    def test_writes_policy_checkpoint_and_tensorboard(self, run):
-        folder, policy = run
-        back = load_policy(folder / "best")
-        assert back.card == policy.card
-        assert PPO.load(folder / "checkpoint.zip", device="cpu").num_timesteps >= 256
-        assert list((folder / "tensorboard").rglob("events*"))
+def test_run_leaves_policy_checkpoint_curve_and_tensorboard(done):
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-    def test_card_tells_how_it_was_made(self, run):
-        card = json.loads((run[0] / "best.json").read_text())
-        assert card["training"]["seed"] == 0
-        assert card["training"]["num_envs"] == 4
-        assert card["environment"]["duration"] == 1.0
-        assert np.isfinite(card["evaluation"]["return"])
+    run, result = done
+    assert result["finished"]
+    assert result["best"]["return"] == pytest.approx(max(row[3] for row in evaluations(run.folder)), rel=1e-9)
+    [checkpoint] = checkpoints(run.folder)
+    assert PPO.load(checkpoint / "model.zip", device="cpu").num_timesteps == 1024
+    events = EventAccumulator(str(next((run.folder / "tensorboard").rglob("events*")).parent)).Reload()
+    wanted = {"evaluation/return", *(f"rollout/{name}" for name in ("reward_tracking", "reward_energy"))}
+    assert wanted <= set(events.Tags()["scalars"])
+    # An episode's return is the sum of its two terms, however TensorBoard came by them.
+    last = {name: events.Scalars(f"rollout/{name}")[-1].value for name in ("reward_tracking", "reward_energy")}
+    assert sum(last.values()) == pytest.approx(events.Scalars("rollout/ep_rew_mean")[-1].value, rel=0.2)
 
 
-def test_interrupt_keeps_the_best_policy(tmp_path, monkeypatch, capsys):
+def test_curve_counts_steps_and_two_kinds_of_seconds(done):
+    rows = evaluations(done[0].folder)
+    assert [row[0] for row in rows] == [0, 256, 512, 768, 1024]
+    for row in rows:
+        assert row[1] <= row[2]
+    assert all(len(row) == len(COLUMNS) for row in rows)
+    assert all(before[2] < after[2] for before, after in pairwise(rows))
+
+
+def test_card_tells_how_it_was_made(done):
+    card = json.loads((done[0].folder / "best.json").read_text())
+    assert card["training"]["seed"] == 0
+    assert card["training"]["num_envs"] == 4
+    assert card["environment"]["duration"] == 1.0
+    assert np.isfinite(card["evaluation"]["return"])
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from agents.keeper import Keeper
+from agents.train import train
+from tests.test_train import small_run
+
+def die(self):
+    if self.num_timesteps > 600:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return True
+
+Keeper._on_step = die
+train(small_run(Path(sys.argv[1]), checkpoint_seconds=0.0))
+"""
+
+
+def test_killed_run_goes_on_to_the_same_policy(done, tmp_path):
+    folder = tmp_path / "run"
+    root = Path(__file__).parent.parent
+    killed = subprocess.run([sys.executable, "-c", KILLED, str(folder)], cwd=root, capture_output=True, check=False)
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
+    assert [path.name for path in checkpoints(folder)] == ["checkpoint_000000000512"]
+    result = train(small_run(folder), resume=True)
+    assert result["finished"]
+    assert [row[0] for row in evaluations(folder)] == [0, 256, 512, 768, 1024]
+    np.testing.assert_allclose(
+        [row[3:] for row in evaluations(folder)], [row[3:] for row in evaluations(done[0].folder)], rtol=1e-12
+    )
+    for name, whole in weights(done[0].folder).items():
+        np.testing.assert_array_equal(weights(folder)[name], whole)
+
+
+def test_interrupted_run_keeps_its_best_policy_and_goes_on(tmp_path, monkeypatch, capsys):
     def interrupt(self):
-        if self.num_timesteps > 256:
+        if self.num_timesteps > 300:
             raise KeyboardInterrupt
         return True
 
-    monkeypatch.setattr(Keeper, "_on_step", interrupt)
-    train_ppo(Settings(duration=1.0, start="on_target"), SMALL, 0, tmp_path, checkpoint_every=256)
+    with monkeypatch.context() as patched:
+        patched.setattr(Keeper, "_on_step", interrupt)
+        result = train(small_run(tmp_path / "run"))
     assert "interrupted; keeping the best policy so far" in capsys.readouterr().err
-    assert load_policy(tmp_path / "best").card.training["timesteps"] < 512
+    assert not result["finished"]
+    assert load_policy(tmp_path / "run/best").card.training["timesteps"] < 512
+    assert train(small_run(tmp_path / "run"), resume=True)["finished"]
 
 
-def test_same_seed_trains_the_same_policy(tmp_path):
-    settings = Settings(duration=1.0)
-    twice = [train_ppo(settings, SMALL, 3, tmp_path / str(k), checkpoint_every=512) for k in range(2)]
-    for name, weights in twice[0].weights.items():
-        np.testing.assert_array_equal(weights, twice[1].weights[name])
+def test_finished_run_is_left_alone(done, monkeypatch):
+    monkeypatch.setattr("agents.keeper.Keeper", None)
+    assert train(done[0], resume=True) == done[1]
+
+
+def test_run_is_neither_overwritten_nor_resumed_with_other_settings(done):
+    run = done[0]
+    with pytest.raises(ValueError, match="output must be free of earlier runs, or --resume be given, got"):
+        train(run)
+    other = replace(run, settings=replace(SMALL, gamma=0.5))
+    with pytest.raises(ValueError, match=r"settings.gamma of a resumed run must be 0.97 as in .* got 0.5"):
+        train(other, resume=True)
+
+
+def test_minutes_end_a_run(tmp_path):
+    result = train(small_run(tmp_path / "run", minutes=1e-9))
+    assert result["finished"]
+    assert result["steps"] < 1024
+
+
+def test_seeds_in_processes_train_what_they_train_alone(done, tmp_path):
+    runs = [small_run(tmp_path / f"seed{seed}", seed=seed) for seed in (0, 1)]
+    results = train_all(runs, workers=2)
+    assert [result["name"] for result in results] == ["seed0", "seed1"]
+    for name, alone in weights(done[0].folder).items():
+        np.testing.assert_array_equal(weights(tmp_path / "seed0")[name], alone)
+    assert any((weights(tmp_path / "seed1")[name] != alone).any() for name, alone in weights(done[0].folder).items())
+    with pytest.raises(ValueError, match="workers must be positive, got 0"):
+        train_all(runs, workers=0)
+
+
+def test_orphan_stops(monkeypatch, tmp_path):
+    class Dead:
+        def is_alive(self):
+            return False
+
+    monkeypatch.setattr("multiprocessing.parent_process", Dead)
+    assert not train(small_run(tmp_path / "run", checkpoint_seconds=0.0))["finished"]
+
+
+def test_first_policy_is_where_the_training_starts(done, tmp_path):
+    run = small_run(tmp_path / "run", initial_policy=done[0].folder / "best", minutes=1e-9)
+    train(run)
+    first = evaluations(run.folder)[0]
+    assert first[3] == pytest.approx(done[1]["best"]["return"], rel=1e-6)
+    wrong = small_run(tmp_path / "wrong", initial_policy=done[0].folder / "best", settings=replace(SMALL, hidden=(9,)))
+    with pytest.raises(ValueError, match=r"layers of the first policy must be \(41, 9, 10\) .* got \(41, 8, 10\)"):
+        train(wrong)
+
+
+SAC_SMALL = SACSettings(
+    total_timesteps=1240,
+    num_envs=4,
+    hidden=(8,),
+    gradient_steps=1,
+    batch_size=32,
+    learning_starts=1200,
+    buffer_size=4000,
+)
+
+
+def test_sac_checkpoint_holds_the_replay_buffer(tmp_path):
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    from agents.checkpoint import load_checkpoint
+    from agents.metered import MeteredVectorEnv
+    from elbow_gym.sb3 import SB3VecEnv
+
+    run = small_run(tmp_path / "run", algorithm="sac", settings=SAC_SMALL)
+    assert train(run)["finished"]
+    card = load_policy(run.folder / "best").card
+    assert (card.algorithm, card.output, card.activation) == ("sac", "tanh", "relu")
+    monitored = VecMonitor(SB3VecEnv(MeteredVectorEnv(4, **run.environment)))
+    model = load_checkpoint(checkpoints(run.folder)[-1], SAC_SMALL.model_class, monitored)
+    buffer = model.replay_buffer
+    assert (model.num_timesteps, buffer.pos, buffer.full) == (1240, 310, False)
+    # What follows an observation is the next one, but where an episode of 50 periods ends.
+    inside = np.arange(309) % 50 != 49
+    np.testing.assert_array_equal(buffer.next_observations[:309][inside], buffer.observations[1:310][inside])
+    assert buffer.timeouts[49].all()
+
+
+def test_warm_start_shows_how_the_task_is_done(tmp_path):
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    from agents.metered import MeteredVectorEnv
+    from agents.warm_start import fill
+    from elbow_gym.sb3 import SB3VecEnv
+
+    sac = replace(SAC_SMALL, learning_starts=1000, warm_start_noise=0.05)
+    env = MeteredVectorEnv(4)
+    model = sac.model(VecMonitor(SB3VecEnv(env)), 0, tmp_path)
+    fill(model, sac, env, seed=0)
+    seen = env.episodes.layout.decode(model.replay_buffer.next_observations[100:250])
+    assert np.median(np.linalg.norm(seen["hand_error"], axis=-1)) < 0.05
+    assert np.ptp(model.replay_buffer.actions[:250] - 0.0) > 0.5
+    narrow = model.predict(model.replay_buffer.observations[0], deterministic=False)[0]
+    assert np.abs(narrow).max() < 0.6

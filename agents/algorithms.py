@@ -1,0 +1,275 @@
+"""Settings of the learning algorithms, one frozen dataclass each, and the defaults for every task."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+FLOOR = 0.05
+"""A falling learning rate ends at this share of its start."""
+
+Activation = Literal["tanh", "relu", "elu"]
+Start = Literal["paper", "on_target"]
+
+
+@dataclass(frozen=True)
+class Falling:
+    """A learning rate that falls linearly with the training to `FLOOR` of its start."""
+
+    start: float
+
+    def __call__(self, remaining: float) -> float:
+        """The rate when this share of the training remains."""
+        return self.start * max(remaining, FLOOR)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AlgorithmSettings:
+    """What all algorithms have."""
+
+    total_timesteps: int
+    """Control periods in all."""
+    num_envs: int
+    """Arms side by side."""
+    learning_rate: float
+    """At the start."""
+    falling: bool = True
+    """Whether the learning rate falls linearly to a twentieth."""
+    gamma: float = 0.97
+    """Discount per control period."""
+    hidden: tuple[int, ...] = (128, 128)
+    """Widths of the actor's layers."""
+    critic_hidden: tuple[int, ...] | None = None
+    """Widths of the critic's layers; the actor's when None."""
+    activation: Activation = "tanh"
+    """Between the layers."""
+    use_sde: bool = False
+    """Generalised state-dependent exploration instead of independent noise."""
+    sde_sample_freq: int = -1
+    """Control periods between two draws of its noise matrix; once per rollout when -1."""
+    start_noise: float | None = None
+    """Of the start pose while it trains [rad]; the environment's own when None. Evaluations keep the environment's."""
+    start: Start | None = None
+    """Where episodes start while it trains; as in the environment when None."""
+    evaluate_every: int = 50_000
+    """Control periods between two evaluations."""
+
+    @property
+    def log_interval(self) -> int:
+        """Rollouts between two entries in TensorBoard."""
+        return 1
+
+    def training_arguments(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
+        """The environment's arguments for the training, from those of the evaluation."""
+        own = {"start_noise": self.start_noise, "start": self.start}
+        return {**arguments, **{name: value for name, value in own.items() if value is not None}}
+
+    @property
+    def model_class(self) -> Any:
+        """Stable-Baselines3's class."""
+        raise NotImplementedError
+
+    def model(self, env: Any, seed: int, log: Path) -> Any:
+        """Stable-Baselines3's model on the CPU.
+
+        Args:
+            env: the `VecEnv` that it trains in.
+            seed: of the networks and the sampling.
+            log: folder for TensorBoard.
+        """
+        raise NotImplementedError
+
+    def _common(self, env: Any, seed: int, log: Path, critic: str) -> dict[str, Any]:
+        import torch
+
+        kinds = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU}
+        widths = self.hidden if self.critic_hidden is None else self.critic_hidden
+        return {
+            "policy": "MlpPolicy",
+            "env": env,
+            "learning_rate": Falling(self.learning_rate) if self.falling else self.learning_rate,
+            "gamma": self.gamma,
+            "use_sde": self.use_sde,
+            "sde_sample_freq": self.sde_sample_freq,
+            "policy_kwargs": {
+                "net_arch": {"pi": list(self.hidden), critic: list(widths)},
+                "activation_fn": kinds[self.activation],
+            },
+            "tensorboard_log": str(log),
+            "seed": seed,
+            "device": "cpu",
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class PPOSettings(AlgorithmSettings):
+    """Proximal policy optimisation, chosen for this arm."""
+
+    total_timesteps: int = 1_500_000
+    num_envs: int = 32
+    learning_rate: float = 5e-4
+    n_steps: int = 128
+    """Control periods per arm and update."""
+    batch_size: int = 1024
+    """Samples per gradient step."""
+    n_epochs: int = 10
+    """Passes over an update's samples."""
+    gae_lambda: float = 0.95
+    """Of the generalised advantage estimate."""
+    clip_range: float = 0.2
+    """Largest change of an action's probability ratio."""
+    ent_coef: float = 0.0
+    """Weight of the entropy bonus."""
+    vf_coef: float = 0.5
+    """Weight of the value function's loss."""
+    max_grad_norm: float = 0.5
+    """Gradients are clipped here."""
+    normalize_advantage: bool = True
+    """Per batch."""
+    target_kl: float | None = None
+    """An update ends early past this divergence; never when None."""
+    log_std_init: float = -1.5
+    """Natural logarithm of the actions' first standard deviation, in units of the supply voltage."""
+
+    @property
+    def model_class(self) -> Any:
+        """Stable-Baselines3's PPO."""
+        from stable_baselines3 import PPO
+
+        return PPO
+
+    def model(self, env: Any, seed: int, log: Path) -> Any:
+        """Stable-Baselines3's PPO."""
+        arguments = self._common(env, seed, log, "vf")
+        arguments["policy_kwargs"]["log_std_init"] = self.log_std_init
+        own = ("n_steps", "batch_size", "n_epochs", "gae_lambda", "clip_range", "ent_coef", "vf_coef", "max_grad_norm")
+        own += ("normalize_advantage", "target_kl")
+        return self.model_class(**arguments, **{name: getattr(self, name) for name in own})
+
+
+@dataclass(frozen=True, kw_only=True)
+class SACSettings(AlgorithmSettings):
+    """Soft actor-critic, chosen for this arm.
+
+    Stock settings start with uniform voltages up to 24 V, which fling the arm about: here the first data come from a
+    controller that works or from a narrow actor.
+    """
+
+    total_timesteps: int = 300_000
+    num_envs: int = 16
+    learning_rate: float = 1e-3
+    gamma: float = 0.95
+    activation: Activation = "relu"
+    evaluate_every: int = 10_000
+    buffer_size: int = 300_000
+    """Control periods remembered, of all arms together."""
+    batch_size: int = 256
+    """Samples per gradient step."""
+    train_freq: int = 1
+    """Control periods of every arm between two rounds of gradient steps."""
+    gradient_steps: int = 8
+    """Per round; -1 for as many as control periods were collected."""
+    tau: float = 0.005
+    """Share by which the target critic follows."""
+    ent_coef: str = "auto_0.02"
+    """Weight of the entropy: a number, or "auto" or "auto_START" to have it learned."""
+    target_entropy: float | None = -25.0
+    """What a learned weight aims at [nat]; minus the number of joints when None."""
+    log_std_init: float = -2.0
+    """Natural logarithm of the actor's first spread, before the squashing."""
+    learning_starts: int = 10_000
+    """Control periods of `warm_start` data, before the first gradient step."""
+    warm_start: Literal["uniform", "actor", "pd"] = "pd"
+    """Where they come from: uniform voltages, the untrained narrow actor, or computed torque with noise, which is the
+    PD with the model's feed-forward and, unlike the paper's, bears being read at 50 Hz."""
+    warm_start_noise: float = 0.1
+    """Standard deviation of that noise, in units of the supply voltage."""
+
+    @property
+    def log_interval(self) -> int:
+        """Episodes between two entries in TensorBoard: one entry whenever all arms have ended theirs."""
+        return self.num_envs
+
+    @property
+    def model_class(self) -> Any:
+        """Stable-Baselines3's SAC."""
+        from stable_baselines3 import SAC
+
+        return SAC
+
+    def model(self, env: Any, seed: int, log: Path) -> Any:
+        """Stable-Baselines3's SAC; `agents.warm_start` fills its replay buffer."""
+        import torch
+
+        arguments = self._common(env, seed, log, "qf")
+        # Clipped means would need an actor of another kind in the bundles.
+        arguments["policy_kwargs"] |= {"log_std_init": self.log_std_init, "clip_mean": 0.0}
+        own = ("buffer_size", "batch_size", "train_freq", "gradient_steps", "tau")
+        model = self.model_class(
+            **arguments,
+            **{name: getattr(self, name) for name in own},
+            ent_coef=self.ent_coef if self.ent_coef.startswith("auto") else float(self.ent_coef),
+            target_entropy="auto" if self.target_entropy is None else self.target_entropy,
+            learning_starts=self.learning_starts if self.warm_start == "uniform" else 0,
+        )
+        if not self.use_sde:
+            with torch.no_grad():
+                model.actor.log_std.weight.mul_(0.01)
+                model.actor.log_std.bias.fill_(self.log_std_init)
+        with torch.no_grad():
+            model.actor.mu.weight.mul_(0.01)
+            model.actor.mu.bias.zero_()
+        return model
+
+
+@dataclass(frozen=True, kw_only=True)
+class CloneSettings:
+    """Imitation of the LQR on the optimal trajectory, by rounds of playing, labelling and fitting."""
+
+    rounds: int = 45
+    """Episodes of every arm; after each the network is fitted to all that was seen so far."""
+    num_envs: int = 64
+    """Arms side by side."""
+    teaching: float = 1.0 / 3.0
+    """Share of the rounds in which the teacher still drives some of the arms, ever fewer."""
+    noise: float = 0.02
+    """Standard deviation of what is added to every other arm's action, in units of the supply voltage."""
+    gradient_steps: int = 200
+    """After every round."""
+    batch_size: int = 1024
+    """Samples per gradient step."""
+    learning_rate: float = 2e-3
+    """At the start; falls along half a cosine."""
+    hidden: tuple[int, ...] = (128, 128)
+    """Widths of the tanh layers."""
+
+
+ALGORITHMS: dict[str, type[AlgorithmSettings]] = {"ppo": PPOSettings, "sac": SACSettings}
+
+_PPO, _SAC = PPOSettings(), SACSettings()
+DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
+    ("ppo", "elbows2"): _PPO,
+    ("ppo", "elbows1"): replace(_PPO, total_timesteps=3_000_000),
+    ("ppo", "elbows0"): replace(_PPO, total_timesteps=5_000_000),
+    ("ppo", "table"): replace(_PPO, total_timesteps=3_000_000),
+    ("ppo", "random"): replace(_PPO, total_timesteps=5_000_000),
+    ("sac", "elbows2"): _SAC,
+    ("sac", "elbows1"): replace(_SAC, total_timesteps=500_000),
+    ("sac", "elbows0"): replace(_SAC, total_timesteps=500_000),
+    ("sac", "table"): replace(_SAC, total_timesteps=500_000),
+    ("sac", "random"): replace(_SAC, total_timesteps=1_000_000),
+}
+"""Settings by algorithm and task."""
+
+
+def default_settings(algorithm: str, task: str) -> AlgorithmSettings:
+    """The settings of an algorithm for a task; for a task without an entry of its own, the algorithm's general ones.
+
+    Raises:
+        ValueError: there is no such algorithm.
+    """
+    if algorithm not in ALGORITHMS:
+        raise ValueError(f"algorithm must be one of {list(ALGORITHMS)}, got {algorithm!r}")
+    return DEFAULTS.get((algorithm, task), ALGORITHMS[algorithm]())

@@ -1,0 +1,76 @@
+"""Plays what the report shows: one episode of every controller from each start, without noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from agents.evaluate import RECORDING_PERIOD
+from agents.figures import SERIES_PERIOD, thinned
+from agents.metrics import REGIMES, metrics
+from agents.recording import Recording, record
+from agents.report.roster import Entry
+from agents.reproduce import RECORD_PERIOD, measure
+from agents.workers import Job, in_processes
+from elbow_gym.settings import STARTS
+
+PAPER_PD = ("pd_paper", "pd")
+"""Whose runs give the paper's numbers (`agents.reproduce.RUNS`)."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One episode and what it cost."""
+
+    controller: str
+    """As in the benchmark's tables."""
+    elbows: int
+    start: str
+    """The environment's `start`."""
+    series: Recording
+    """Every `SERIES_PERIOD`, or every control period where that is longer."""
+    figures: Mapping[str, Mapping[str, float]]
+    """Metrics (`agents.metrics.UNITS`) by regime, of the regimes with this start."""
+    measured: Mapping[str, Any] | None = None
+    """What `agents.reproduce.measure` found: of the paper's PD alone."""
+
+    @property
+    def key(self) -> str:
+        """Its name in the page."""
+        return f"{self.controller}-{self.elbows}-{self.start}"
+
+
+def collect(entries: Sequence[Entry], progress: Callable[[int], Any]) -> list[Run]:
+    """Both runs of every entry, in the entries' order, from as many processes as there are cores."""
+    played = in_processes({entry: Job(partial(play, entry), entry.size) for entry in entries}, progress)
+    return [run for entry in entries for run in played[entry]]
+
+
+def play(entry: Entry, progress: Callable[[int], Any]) -> list[Run]:
+    """An entry's runs from all starts; `progress` is told the entry's size in parts."""
+    settings, make = entry.contender()
+    paper = entry.name in PAPER_PD
+    period = RECORD_PERIOD if paper else RECORDING_PERIOD
+    every = max(1, round(settings.control_frequency * period))
+    runs, told = [], 0
+    for number, start in enumerate(STARTS):
+
+        def tell(done: int, horizon: int, number: int = number) -> None:
+            nonlocal told
+            reached = round(entry.size * (number + done / horizon) / len(STARTS))
+            progress(reached - told)
+            told = reached
+
+        started = replace(settings, start=start, start_noise=0.0)
+        recording = record(started, make, (0,), tell, every)
+        figures = {
+            regime.name: {name: float(values[0]) for name, values in metrics(recording, regime.since).items()}
+            for regime in REGIMES
+            if regime.start == start
+        }
+        measured = measure(recording) if paper else None
+        series = thinned(recording, SERIES_PERIOD)
+        runs.append(Run(entry.controller, entry.elbows, start, series, figures, measured))
+    return runs

@@ -1,0 +1,99 @@
+"""The energy benchmark's rows as Markdown, CSV and a table on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from agents.files import write_csv
+from agents.metrics import UNITS
+from agents.style import CONTROLLER_NAMES
+from benchmarks.statistics import Estimate
+
+if TYPE_CHECKING:
+    from benchmarks.energy import Row
+
+HEADER = (
+    "controller",
+    "elbows",
+    "regime",
+    "energy (J)",
+    "drawn (J)",
+    "rms (mm)",
+    "z rms (mm)",
+    "return",
+    "gap",
+    "pull (N)",
+    "below (s)",
+    "seeds",
+)
+
+
+def shown(row: Row, estimate: Callable[[Estimate], str]) -> tuple[str, ...]:
+    """A row's cells under HEADER; `estimate` writes the figures that have an interval."""
+    figures = row.figures
+    force = figures["smallest_elbow_force"].value
+    return (
+        CONTROLLER_NAMES.get(row.controller, row.controller),
+        str(row.elbows),
+        row.regime,
+        estimate(figures["electrical_energy"]),
+        f"{figures['drawn_energy'].value:.4g}",
+        estimate(figures["error_rms"]),
+        f"{figures['z_rms'].value:.3g}",
+        f"{figures['return'].value:.4g}",
+        "" if row.gap is None else f"{100.0 * row.gap:.3g} %",
+        # Only a negative force is a pull on the table.
+        f"{force:.1f}" if force < 0.0 else "-",
+        f"{figures['below_table'].value:.2f}",
+        str(len(row.seeds)) if row.seeds else "-",
+    )
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    """The README's table, with 95 % intervals."""
+    lines = [HEADER, ("---",) * len(HEADER)]
+    lines += [shown(row, lambda e: f"{e.value:.4g} [{e.low:.4g}, {e.high:.4g}]") for row in rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def table(rows: Sequence[Row], title: str) -> Any:
+    """The same for the terminal, without the intervals."""
+    from rich.table import Table
+
+    body = Table(title=f"{title}: interquartile means over training seeds and episodes")
+    for name in HEADER:
+        body.add_column(name, justify="left" if name == "controller" else "right", no_wrap=name == "controller")
+    for row, after in zip(rows, [*rows[1:], None], strict=True):
+        last = after is None or (row.controller, row.elbows) != (after.controller, after.elbows)
+        body.add_row(*shown(row, lambda e: f"{e.value:.4g}"), end_section=last)
+    return body
+
+
+def write_rows(rows: Sequence[Row], path: Path) -> None:
+    """Writes every figure with its interval, and the energy of every joint."""
+    header = ["controller", "elbows", "regime"]
+    header += [f"{name} [{unit}]{part}" for name, unit in UNITS.items() for part in ("", " low", " high")]
+    joints = max(len(row.joint_energy) for row in rows)
+    header += [f"electrical_energy_joint_{k + 1} [J]" for k in range(joints)]
+    header += ["optimality_gap [-]", "training_seeds [-]"]
+    body = [
+        [row.controller, row.elbows, row.regime]
+        + [f"{value:.6g}" for name in UNITS for value in row.figures[name]]
+        + [f"{value:.6g}" for value in row.joint_energy]
+        + ["" if row.gap is None else f"{row.gap:.6g}", len(row.seeds)]
+        for row in rows
+    ]
+    write_csv(path, header, body)
+
+
+def write_seeds(rows: Sequence[Row], path: Path) -> None:
+    """Writes each training seed's interquartile means over its episodes."""
+    header = ["controller", "elbows", "part", "regime", "seed", *(f"{name} [{unit}]" for name, unit in UNITS.items())]
+    body = [
+        [row.controller, row.elbows, row.part, row.regime, int(own["seed"]), *(f"{own[name]:.6g}" for name in UNITS)]
+        for row in rows
+        for own in row.seeds
+    ]
+    write_csv(path, header, body)

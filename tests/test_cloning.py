@@ -1,0 +1,64 @@
+"""Clones of the optimum: they learn from their teacher, repeat for the same seed, and leave whole runs."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from agents.algorithms import CloneSettings
+from agents.cloning import clone, clone_all
+from agents.keeper import evaluation
+from agents.policy import load_policy
+from agents.publish import publish
+from agents.trajectory import OPTIMA, Trajectory
+from elbow_gym.settings import Settings
+
+PERIODS = 15
+SETTINGS = Settings(elbows=2, duration=PERIODS * 0.02)
+SMALL = CloneSettings(rounds=4, num_envs=4, gradient_steps=40, batch_size=64, hidden=(32,), learning_rate=1e-2)
+
+
+@pytest.fixture(scope="module")
+def beginning():
+    whole = Trajectory.load(OPTIMA / "elbows2.npz")
+    states = {name: getattr(whole, name)[: PERIODS + 1] for name in ("q", "q_dot", "current")}
+    return replace(whole, **states, voltage=whole.voltage[:PERIODS])
+
+
+def test_clone_acts_as_its_teacher_where_the_teacher_goes(beginning):
+    seen = []
+    policy = clone(SETTINGS, beginning, SMALL, 0, {"command": ""}, lambda steps, policy: seen.append((steps, policy)))
+    assert [steps for steps, _ in seen] == [4 * PERIODS * k for k in (1, 2, 3, 4)]
+    first, last = (evaluation(which, SETTINGS)["return"] for which in (seen[0][1], policy))
+    best = evaluation(clone_of_nothing(policy), SETTINGS)["return"]
+    assert last > best
+    assert last >= first - 0.05 * abs(first)
+
+
+def clone_of_nothing(policy):
+    """The same network with zero weights: no voltage at all."""
+    return type(policy)(
+        replace(policy.card, digest=""), {name: np.zeros_like(value) for name, value in policy.weights.items()}
+    )
+
+
+def test_same_seed_gives_the_same_clone_bit_for_bit(beginning):
+    twice = [clone(SETTINGS, beginning, SMALL, 3, {"command": ""}, lambda *_: None) for _ in range(2)]
+    other = clone(SETTINGS, beginning, SMALL, 4, {"command": ""}, lambda *_: None)
+    assert twice[0].card.digest == twice[1].card.digest != other.card.digest
+
+
+def test_run_of_a_clone_can_be_published_and_loaded(tmp_path, beginning):
+    beginning.save(tmp_path / "beginning.npz")
+    folder = tmp_path / "clone_elbows2_seed5"
+    result = clone_all(SETTINGS, tmp_path / "beginning.npz", SMALL, [5], [folder], "command")[5]
+    assert result["finished"]
+    assert json.loads((folder / "result.json").read_text()) == result
+    assert publish([folder], tmp_path / "policies", tmp_path / "curves") == ["clone_elbows2_seed5"]
+    policy = load_policy(tmp_path / "policies" / "clone_elbows2_seed5")
+    assert evaluation(policy, SETTINGS)["return"] == pytest.approx(result["best"]["return"])
+    with pytest.raises(ValueError, match="output must be free of earlier runs"):
+        clone_all(SETTINGS, tmp_path / "beginning.npz", SMALL, [5], [folder], "command")
+    with pytest.raises(ValueError, match="trajectory must be a file"):
+        clone_all(SETTINGS, tmp_path / "nothing.npz", SMALL, [6], [tmp_path / "other"], "command")
