@@ -6,10 +6,24 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+VECTORS = {
+    "avx512f": "AVX-512, 8 doubles",
+    "avx2": "AVX2, 4 doubles",
+    "avx": "AVX, 4 doubles",
+    "sse2": "SSE2, 2 doubles",
+    "neon": "NEON, 2 doubles",
+}
+"""Name of each of LLVM's processor features, widest first."""
+
 
 def machine() -> dict[str, str]:
-    """Python, system and processor."""
-    return {"python": platform.python_version(), "system": platform.system(), "processor": processor()}
+    """Python, system, processor and the widest vectors that it computes with, which decide the kernel's speed."""
+    return {
+        "python": platform.python_version(),
+        "system": platform.system(),
+        "processor": processor(),
+        "vectors": vectors(),
+    }
 
 
 def versions(*packages: str) -> dict[str, str]:
@@ -25,6 +39,14 @@ def processor() -> str:
             if line.startswith("model name"):
                 return line.split(":", 1)[1].strip()
     return platform.processor() or platform.machine()
+
+
+def vectors() -> str:
+    """The processor's widest vector instructions, as the kernel's compiler sees them; empty if none of these."""
+    import llvmlite.binding as llvm
+
+    features = llvm.get_host_cpu_features()
+    return next((name for feature, name in VECTORS.items() if features.get(feature)), "")
 
 
 def _version(name: str) -> str | None:

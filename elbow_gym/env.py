@@ -208,9 +208,9 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._viewer.follow()
         return (
             outcome.observation[0],
-            float(outcome.reward[0]),
-            bool(outcome.terminated[0]),
-            bool(outcome.truncated[0]),
+            outcome.reward.item(),
+            outcome.terminated.item(),
+            outcome.truncated.item(),
             single(outcome.info),
         )
 
@@ -245,8 +245,8 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 def single(info: Mapping[str, Any]) -> dict[str, Any]:
     """The info of the only arm: plain numbers and truths, and arrays of their own."""
     return {
-        key: single(cast("Mapping[str, Any]", rows))
-        if isinstance(rows, Mapping)
-        else (rows[0].item() if rows.ndim == 1 else rows[0])
+        key: single(cast("dict[str, Any]", rows))
+        if isinstance(rows, dict)
+        else (rows.item() if rows.ndim == 1 else rows[0])
         for key, rows in info.items()
     }

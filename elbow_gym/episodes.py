@@ -221,12 +221,10 @@ class Episodes:
 
     def info(self, sight: task.Sight, voltage: Array | None = None) -> dict[str, Any]:
         """Fresh arrays of the step's figures, one row per arm; without a voltage, of a reset: also what was drawn."""
-        info = {
-            **dict(zip(INFO_FIGURES, sight.figures, strict=False)),
-            "voltage": np.zeros((self.num_envs, self.arm.n_joints)) if voltage is None else voltage,
-            "elbow_force": self.simulator.elbow_force.copy(),
-            **self.extras.info(),
-        }
+        info: dict[str, Any] = dict(zip(INFO_FIGURES, sight.figures, strict=False))
+        info["voltage"] = np.zeros((self.num_envs, self.arm.n_joints)) if voltage is None else voltage
+        info["elbow_force"] = self.simulator.elbow_force.copy()
+        info.update(self.extras.info())
         if voltage is None:
             if self.population.randomization.ranges or self.population.changed:
                 info["parameters"] = self.population.copy()

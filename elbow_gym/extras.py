@@ -33,12 +33,15 @@ class Extras:
         """Voltages asked for, newest first [V], (B, 1 + longest delay, n)."""
         self._limits = simulator.arm.of_motors("temperature_limit")
         self._generators: list[np.random.Generator] = []
+        self._noisy = False
+        self._one = np.ones(arms)
         self.sizes = {
             "contact_force": n - 1 if settings.conditions.surface is not None else 0,
             "temperature_rise": n if settings.heat else 0,
             "pending_voltage": n * self._longest_delay,
         }
         """Entries that each optional feature adds to an observation."""
+        self._switched = [name for name, size in self.sizes.items() if size]
 
     def check(self, values: Mapping[str, Array]) -> None:
         """Raises ValueError when an arm's actions would be later than observations make room for."""
@@ -49,11 +52,12 @@ class Extras:
             )
 
     def listen(self, chosen: NDArray[np.int64], generators: Sequence[np.random.Generator]) -> None:
-        """The chosen arms' noise comes from these generators from now on."""
+        """The chosen arms' noise comes from these generators and is as strong as their values say from now on."""
         if not self._generators:
             self._generators = [np.random.default_rng(0)] * self._simulator.num_envs
         for i, generator in zip(chosen, generators, strict=True):
             self._generators[int(i)] = generator
+        self._noisy = bool(self._population.values["sensor_noise"].any())
 
     def reset(self, chosen: NDArray[np.int64], generators: Sequence[np.random.Generator]) -> None:
         """The chosen arms start without voltages on their way."""
@@ -66,8 +70,7 @@ class Extras:
         Raises ValueError when an action is not a number, with nothing changed.
         """
         supply = self._population.values["supply_voltage"]
-        one = np.ones_like(supply)
-        highest, volts = (one, supply) if self._settings.action_unit == "fraction" else (supply, one)
+        highest, volts = (self._one, supply) if self._settings.action_unit == "fraction" else (supply, self._one)
         asked = np.empty_like(action)
         if not kernel.drive(action, highest, volts, asked):
             raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
@@ -82,13 +85,13 @@ class Extras:
         self, layout: ObservationLayout, observation: NDArray[np.float32], resting: NDArray[np.bool_] | None
     ) -> None:
         """Fills the optional features of observations (B, size), and adds noise for arms that do not rest."""
-        for name, where in layout.slices.items():
-            if self.sizes.get(name):
-                values = self._quantity(name).reshape(len(observation), -1) / layout.scale[where]
-                observation[:, where] = np.clip(values, -layout.high[where], layout.high[where])
-        noise = self._population.values["sensor_noise"]
-        if not noise.any():
+        for name in self._switched:
+            where = layout.slices[name]
+            values = self._quantity(name).reshape(len(observation), -1) / layout.scale[where]
+            observation[:, where] = np.clip(values, -layout.high[where], layout.high[where])
+        if not self._noisy:
             return
+        noise = self._population.values["sensor_noise"]
         noisy = int(layout.slices["target_angle"].start)
         for i in np.flatnonzero(noise > 0.0 if resting is None else (noise > 0.0) & ~resting):
             heard = observation[i, :noisy] + float(noise[i]) * self._generators[int(i)].standard_normal(noisy)

@@ -819,6 +819,8 @@ def joint(ws, o, k, q_ddot, weight, ahead, first, last):
 def stage(ws, n, weight, ahead, first, last):
     """Joint accelerations, base to tip (the yaw stands alone), and what the stage makes of them."""
     end = U((n - 1) * STRIDE)
+    # A loop of its own: whether rows of the tip and of the base overlap shows only at run time, and with all rows of
+    # `joint` in the loop LLVM gives up on testing for that and leaves it scalar.
     for k in range(LANES):
         load = ws[end + PAYLOAD + k]
         rho = ws[end + RHO + k]
@@ -832,7 +834,9 @@ def stage(ws, n, weight, ahead, first, last):
             drawn = max(ws[end + BUS + k], ws[BUS_FLOOR + k])
             ws[SHARE + k] = 1.0 - ws[SAG + k] * drawn
             ws[SUPPLY_LOSS + k] += weight * (ws[SAG + k] * drawn * drawn)
-        joint(ws, U(0), k, (u - rate * ws[QD + k]) / inertia, weight, ahead, first, last)
+        ws[R + k] = (u - rate * ws[QD + k]) / inertia
+    for k in range(LANES):
+        joint(ws, U(0), k, ws[R + k], weight, ahead, first, last)
         ws[SPIN + k] = ws[QD + k] * ws[QD + k]
         if TABLE:
             ws[PSID + k] = ws[QD + k]

@@ -30,7 +30,12 @@ class Targets:
         self._path = np.repeat(first.path[None], num_envs, axis=0)
         self._rate = np.full(num_envs, first.rate)
         self._phase = np.zeros(num_envs)
+        self._pace()
         self._alike = not circle.random
+
+    def _pace(self) -> None:
+        """What follows from the rates: how far the targets turn in a control period, and to the look-ahead [rad]."""
+        self._turn, self._lookahead = self._rate * self._period, self._rate * LOOKAHEAD
 
     def draw(self, circle: Circle, generators: Sequence[np.random.Generator], phase: object = None) -> list[Circle]:
         """New circles, each by its arm's generator, which start at `phase` [rad] if it is given.
@@ -54,14 +59,15 @@ class Targets:
             self._alike = self._alike and bool((circle.path == self.circles[0].path).all())
             self.circles[int(i)] = circle
             self._path[i], self._rate[i], self._phase[i] = circle.path, circle.rate, float(circle.phase)
+        self._pace()
 
     def angle(self, steps: NDArray[np.int64]) -> Array:
         """Angle of each target on its path after `steps` control periods [rad], (B,)."""
-        return self._phase + np.multiply(self._rate * self._period, steps, dtype=np.float64)
+        return self._phase + self._turn * steps
 
     def after(self, steps: NDArray[np.int64]) -> Target:
         """What the hands should follow after `steps` control periods."""
-        return Target(self._path, self.angle(steps), self._rate * LOOKAHEAD)
+        return Target(self._path, self.angle(steps), self._lookahead)
 
     def position(self, angle: Array) -> Array:
         """Each target's position at its angle [m], (B, 3)."""
@@ -94,6 +100,7 @@ class Targets:
                 raise ValueError(f"state[{name!r}] must have shape {array.shape}, got {got}")
         for name, array in own.items():
             array[...] = state[name]
+        self._pace()
         self.circles = list(state["circles"])
         self._alike = bool((self._path == self._path[0]).all())
 

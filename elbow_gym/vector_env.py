@@ -169,20 +169,21 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             )
         array = as_action(actions, (self.num_envs, self._episodes.arm.n_joints))
         waiting = self._over
-        if self.autoreset_mode is AutoresetMode.DISABLED and waiting.any():
+        some_wait = bool(waiting.any())
+        if some_wait and self.autoreset_mode is AutoresetMode.DISABLED:
             raise gym.error.ResetNeeded(
                 f"reset must be called with options['reset_mask'] for arms that are over, got {np.flatnonzero(waiting)}"
             )
-        outcome = self._episodes.step(array, waiting if waiting.any() else None)
+        outcome = self._episodes.step(array, waiting if some_wait else None)
         self._viewer.follow()
         over = outcome.terminated | outcome.truncated
-        if not over.any() and not waiting.any():
+        if not some_wait and not over.any():
             everyone = np.ones(self.num_envs, dtype=np.bool_)
             return (*outcome[:4], masked(outcome.info, everyone))
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             return self._same_step(outcome, over)
         drawn: dict[str, Any] = {}
-        if waiting.any():
+        if some_wait:
             # Arms that ended a step ago start anew instead; what they did meanwhile does not count.
             self._episodes.reset(self._generators, waiting)
             self._viewer.restart(waiting)
@@ -262,7 +263,7 @@ def drawn_only(info: Mapping[str, Any], flows: Mapping[str, Any]) -> dict[str, A
 def masked(info: Mapping[str, Any], mask: Flags) -> dict[str, Any]:
     """Gymnasium's vector info: each key beside its `_key` mask of the arms that have it, dicts inside likewise."""
     full: dict[str, Any] = {
-        key: masked(cast("Mapping[str, Any]", rows), mask) if isinstance(rows, Mapping) else rows
+        key: masked(cast("dict[str, Any]", rows), mask) if isinstance(rows, dict) else rows
         for key, rows in info.items()
     }
     full.update({f"_{key}": mask.copy() for key in info})

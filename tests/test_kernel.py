@@ -164,3 +164,14 @@ def test_what_no_folder_can_cache_is_compiled_all_the_same():
     with pytest.raises(RuntimeError, match="cannot cache"):
         kernel.njit(cache=True)(space["double"])
     assert kernel._compiled(space["double"], cached=True)(3.0) == 6.0
+
+
+def test_where_all_folders_are_read_only_the_kernels_functions_compile_all_the_same(monkeypatch):
+    def refuse(**_):
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr("numba.core.caching.tempfile.TemporaryFile", refuse)
+    with pytest.raises(RuntimeError, match="cannot cache"):
+        kernel.njit(cache=True)(kernel.sincos)
+    sine, cosine = kernel._compiled(kernel.sincos, cached=True)(0.5)
+    assert (sine, cosine) == pytest.approx((math.sin(0.5), math.cos(0.5)), rel=1e-15)

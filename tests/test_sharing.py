@@ -1,5 +1,10 @@
+import gc
+import threading
+
+import numpy as np
 import pytest
 
+from elbow_gym import Simulator
 from elbow_gym.sharing import Sharing
 
 
@@ -25,3 +30,25 @@ def test_an_error_in_another_thread_is_raised_here():
 
     with pytest.raises(ArithmeticError, match="the second share"):
         Sharing(2, 1, 2).total(work)
+
+
+def test_an_error_of_one_call_is_not_the_next_ones():
+    sharing = Sharing(2, 1, 2)
+    with pytest.raises(ZeroDivisionError):
+        sharing.total(lambda first, _: 1 // first)
+    with pytest.raises(ZeroDivisionError):
+        sharing.total(lambda first, _: 1 // (1 - first))
+    assert sharing.total(lambda first, _: 1 + first) == 3
+
+
+def test_threads_end_with_the_arms_they_worked_for():
+    before = set(threading.enumerate())
+    simulator = Simulator(num_envs=40, num_threads=3)
+    simulator.step(np.zeros(10))
+    started = set(threading.enumerate()) - before
+    assert len(started) == 2
+    del simulator
+    gc.collect()
+    for thread in started:
+        thread.join(timeout=10.0)
+        assert not thread.is_alive()

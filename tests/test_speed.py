@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import sys
 import time
 from functools import partial
@@ -45,6 +46,7 @@ def test_quick_run_writes_all_own_rows_and_names_missing_peers(tmp_path, capsys,
     assert set(context["skipped"]) == {"MuJoCo", "Pinocchio", "Gymnasium"}
     assert context["versions"]["numba"]
     assert context["machine"]["processor"]
+    assert re.fullmatch(r"((AVX-512|AVX2|AVX|SSE2|NEON), \d doubles)?", context["machine"]["vectors"])
     said = capsys.readouterr().out
     for name in ("MuJoCo", "Pinocchio", "Gymnasium"):
         assert f"Skipped for want of a library: rows of {name} (" in said
