@@ -120,7 +120,7 @@ def report(output: Path = Path("report.html")) -> None:
     Args:
         output: the file; it opens without a network.
     """
-    from agents.report import report as write_report
+    from agents.report.command import report as write_report
 
     write_report(output)
 

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from browser import chromium, emulate, keep_picture
 
-from agents import report as package
 from agents.evaluate import CLASSICAL
 from agents.figures import write_series
 from agents.metrics import metrics
 from agents.recording import Recording
-from agents.report import colours, payload
+from agents.report import colours, command, payload
+from agents.report import roster as lineup
 from agents.report.page import page
 from agents.report.roster import Entry, roster
 from agents.report.runs import Run, play
 from agents.reproduce import RESULTS, measure, settings_of
-from agents.style import CONTROLLER_COLOURS, ELBOW_COLOURS
+from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, ELBOW_COLOURS
 from elbow_gym.circle import Circle
 from elbow_gym.kinematics import joint_positions
 
@@ -61,7 +61,7 @@ def made_up(controller, elbows, start):
         name: {key: float(value[0]) for key, value in metrics(recording, since).items()}
         for name, since in regimes.items()
     }
-    return Run(controller, elbows, start, recording, figures, measure(recording))
+    return Run(controller, str(elbows), start, recording, figures, measure(recording))
 
 
 @pytest.fixture(scope="module")
@@ -185,16 +185,43 @@ def test_every_controller_of_the_benchmark_is_played(tmp_path):
     assert {entry.elbows for entry in roster(RESULTS) if entry.name == "lqr"} == {2, 1, 0}
 
 
+def test_policies_are_played_where_they_were_trained(tmp_path, monkeypatch):
+    shipped = [
+        "ppo_elbows1_seed0",
+        "ppo_elbows1_seed3",
+        "sac_cloned_elbows0_seed1",
+        "ppo_random_seed0",
+        "sac_table_seed2",
+    ]
+    monkeypatch.setattr(lineup, "shipped_policies", lambda: shipped)
+    learned = [entry for entry in roster(tmp_path) if entry.name not in CLASSICAL]
+    assert [(entry.controller, entry.bearing, entry.env) for entry in learned] == [
+        ("ppo", "1", "ElbowArm-v0"),
+        ("ppo_random", "2", "ElbowArmRandom-v0"),
+        ("sac_cloned", "0", "ElbowArm-v0"),
+        ("sac", "table", "ElbowArmTable-v0"),
+    ]
+    beside = [entry for entry in roster(tmp_path) if entry.bearing == "table" and entry.name in CLASSICAL]
+    assert {entry.name for entry in beside} == set(CLASSICAL) - {"pd_paper"}
+    assert all(entry.contender()[0].table for entry in beside)
+
+
+def test_every_marker_has_its_drawing(document):
+    drawn = re.search(r"const MARKERS = \{(.*?)\};", document, re.DOTALL)[1]
+    named = set(re.findall(r'^\s+"?([^":\s]+)"?: "M', drawn, re.MULTILINE))
+    assert set(CONTROLLER_MARKERS.values()) <= named
+
+
 def test_the_command_writes_the_file_whole_or_not_at_all(runs, document, tmp_path, monkeypatch):
-    monkeypatch.setattr(package, "collect", lambda entries, progress: progress(1) or runs)
-    assert package.report(tmp_path / "all" / "report.html").read_text(encoding="utf-8") == document
+    monkeypatch.setattr(command, "collect", lambda entries, progress: progress(1) or runs)
+    assert command.report(tmp_path / "all" / "report.html").read_text(encoding="utf-8") == document
 
     def broken(*_):
         raise ValueError("no")
 
-    monkeypatch.setattr(package, "page", broken)
+    monkeypatch.setattr(command, "page", broken)
     with pytest.raises(ValueError, match="no"):
-        package.report(tmp_path / "none" / "report.html")
+        command.report(tmp_path / "none" / "report.html")
     assert not list(tmp_path.glob("none/*"))
 
 
@@ -243,7 +270,7 @@ def test_it_opens_without_errors_and_without_requests(opened):
 @pytest.fixture(scope="module")
 def rows(runs, tmp_path_factory):
     """The series of the paper's cases as `python -m agents reproduce` writes them, by elbows and time."""
-    cases = {run.elbows: run.series for run in runs if run.controller == "pd_paper" and run.start == "paper"}
+    cases = {int(run.bearing): run.series for run in runs if run.controller == "pd_paper" and run.start == "paper"}
     path = write_series(tmp_path_factory.mktemp("series") / "series.csv", cases)
     with path.open(newline="", encoding="utf-8") as handle:
         return {(int(row["elbows"]), round(float(row["time [s]"]), 2)): row for row in csv.DictReader(handle)}

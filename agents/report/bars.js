@@ -1,13 +1,9 @@
 /** Each joint's power at the slider's time: a table whose cells hold bars. */
 
-import { quantity } from "./format.js";
 import { meanAt } from "./data.js";
+import { quantity } from "./format.js";
+import { limits, makeScale } from "./scale.js";
 import { html } from "./svg.js";
-
-/** A bar's length for a power [W], as a share of half the cell: linear to 1 W, logarithmic beyond, 10 kW at the end. */
-function share(power) {
-  return Math.min(1, Math.asinh(Math.abs(power)) / Math.asinh(1e4));
-}
 
 export class JointBars {
   /** `onJoint(number)` is called when a joint is chosen; 0 stands for all. */
@@ -28,10 +24,19 @@ export class JointBars {
     }
     const head = ["joint", "power", "A", "B"].map((title) => {
       const slot = title.length === 1 ? `slot-${title.toLowerCase()}` : null;
-      return html("th", { scope: "col", class: slot }, title.length === 1 ? `${title} [W]` : title);
+      return html("th", { scope: "col", class: slot }, title);
     });
-    const caption = html("caption", {}, "Electrical power of each joint (bars: logarithmic beyond 1 W)");
-    host.append(html("table", {}, caption, html("thead", {}, html("tr", {}, ...head)), body));
+    const caption = html("caption", {}, "Electrical power of each joint [W]; bars grow with the logarithm beyond 1 W");
+    this.table = html("table", {}, caption, html("thead", {}, html("tr", {}, ...head)), body);
+    host.append(this.table);
+  }
+
+  /** Lets the longest bar of the runs from `since` on fill its cell. */
+  show(runs, since) {
+    const powers = runs.flatMap((run) => (run ? [...run.totalPower].filter((_, k) => run.time[k] > since) : []));
+    const parts = runs.flatMap((run) => (run ? [...run.power].filter((_, k) => Math.floor(k / run.nJoints) * run.period > since) : []));
+    this.scale = makeScale("signed", limits("signed", [...powers, ...parts]), [0, 100]);
+    this.table.style.setProperty("--zero", `${this.scale(0)}%`);
   }
 
   choose(joint) {
@@ -44,8 +49,9 @@ export class JointBars {
         const run = runs[slot];
         const power = run && powerAt(run, joint, time);
         number.textContent = run ? quantity(power) : "";
-        bar.style.width = run ? `${50 * share(power)}%` : "0";
-        bar.style.left = power < 0 ? `${50 - 50 * share(power)}%` : "50%";
+        const [zero, end] = run ? [this.scale(0), this.scale(power)] : [0, 0];
+        bar.style.left = `${Math.min(zero, end)}%`;
+        bar.style.width = `${Math.abs(end - zero)}%`;
       });
     });
   }

@@ -1,7 +1,7 @@
 /** A camera on an orbit: perspective from the world [m] to pixels. */
 
 export const VIEWS = {
-  arm: { centre: [0.95, 0.62, 0.12], azimuth: -62, elevation: 22, distance: 3.7 },
+  arm: { centre: [0.95, 0.62, 0.12], azimuth: -62, elevation: 27, distance: 3.6 },
   side: { centre: [1.0, 0.75, 0.2], azimuth: 0, elevation: 6, distance: 4.0, follows: true },
   above: { centre: [1.0, 0.75, 0.0], azimuth: -90, elevation: 88, distance: 4.4 },
   circle: { centre: [1.5, 1.5, 0.36], azimuth: -62, elevation: 26, distance: 0.95 },

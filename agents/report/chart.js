@@ -2,7 +2,7 @@
 
 import { quantity, seconds, short } from "./format.js";
 import { limits, makeScale } from "./scale.js";
-import { html, pathOf, svg, whenSized } from "./svg.js";
+import { html, pathOf, svg, whenSeen } from "./svg.js";
 
 const CHART_MARGIN = { left: 46, right: 10, top: 8, bottom: 24 };
 
@@ -13,21 +13,20 @@ const CHART_MARGIN = { left: 46, right: 10, top: 8, bottom: 24 };
  * `moveTo(time)` moves the line that marks the time and writes the curves' values there into the caption.
  */
 export class TimeChart {
-  constructor(figure, { title, unit, kind = "linear", onTime, zones = null }) {
-    Object.assign(this, { figure, title, unit, kind, onTime, zones, curves: [], range: [0, 1], time: 0 });
+  constructor(figure, { title, unit, kind = "linear", onTime, zones = null, empty = "" }) {
+    Object.assign(this, { figure, title, unit, kind, onTime, zones, empty, curves: [], range: [0, 1], time: 0 });
     this.now = html("span", { class: "now" });
     this.plot = html("div", { class: "plot" });
     this.heading = html("strong", {}, `${title} [${unit}]`);
     figure.append(html("figcaption", {}, this.heading, this.now), this.plot);
-    this.redraw = whenSized(this.plot, (width, height) => this.draw(width, height));
+    this.picture = whenSeen(this.plot, (width, height) => this.draw(width, height));
     this.listen();
   }
 
   show(curves, range) {
     this.curves = curves;
     this.range = range;
-    this.redraw();
-    this.moveTo(this.time);
+    this.picture.redraw();
   }
 
   rename(title) {
@@ -51,6 +50,7 @@ export class TimeChart {
       const d = pathOf(xs, Array.from(course.subarray(start), y));
       root.append(svg("path", { class: "curve", d, style: style(colour, thickness, dash) }));
     }
+    if (!this.curves.length) root.append(svg("text", { class: "tick", x: width / 2, y: height / 2, "text-anchor": "middle" }, this.empty));
     this.cursor = svg("line", { class: "cursor", y1: CHART_MARGIN.top, y2: bottom });
     root.append(this.cursor);
     this.plot.replaceChildren(root);
@@ -59,11 +59,10 @@ export class TimeChart {
 
   moveTo(time, hovered = false) {
     if (!hovered) this.time = time;
-    if (this.x && this.cursor) {
-      const x = this.x(Math.min(Math.max(time, this.range[0]), this.range[1])).toFixed(1);
-      this.cursor.setAttribute("x1", x);
-      this.cursor.setAttribute("x2", x);
-    }
+    if (!this.picture.seen() || !this.cursor) return;
+    const x = this.x(Math.min(Math.max(time, this.range[0]), this.range[1])).toFixed(1);
+    this.cursor.setAttribute("x1", x);
+    this.cursor.setAttribute("x2", x);
     const parts = this.curves.map(({ label, colour, at }) => {
       return html("span", { style: `--mark: ${colour}` }, `${label} ${quantity(at(time))}`);
     });

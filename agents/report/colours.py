@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from agents.report.roster import TABLE
 from agents.style import CONTROLLER_COLOURS, ELBOW_COLOURS, TARGET_COLOUR
 
 BACKGROUNDS = {"light": "#ffffff", "dark": "#14181d"}
 """Of the panels, as in page.css."""
+TABLE_COLOUR = "#009E73"
+"""Of the table that cannot pull, beside the elbow counts' colours."""
 CONTRAST = 3.0
 """At least, of graphics against their background (WCAG 2.2, 1.4.11)."""
 
@@ -23,7 +26,9 @@ def contrast(colour: str, background: str) -> float:
 
 
 def legible(colour: str, background: str) -> str:
-    """The colour, mixed with as little black or white as gives `CONTRAST` on the background."""
+    """The colour, mixed with as little black or white as gives `CONTRAST` on the background; black turns white."""
+    if colour == TARGET_COLOUR and luminance(background) < 0.5:
+        return "#ffffff"
     toward = 0.0 if luminance(background) > 0.5 else 1.0
     for step in range(51):
         mixed = "#" + "".join(f"{round(255 * (c + (toward - c) * step / 50)):02x}" for c in _channels(colour))
@@ -37,9 +42,10 @@ def _channels(colour: str) -> list[float]:
 
 
 def stylesheet() -> str:
-    """CSS custom properties --controller-NAME, --elbows-N and --target for both schemes."""
+    """CSS custom properties --controller-NAME, --bearing-NAME and --target for both schemes."""
     colours = {f"controller-{name}": colour for name, colour in CONTROLLER_COLOURS.items()}
-    colours |= {f"elbows-{elbows}": colour for elbows, colour in ELBOW_COLOURS.items()}
+    colours |= {f"bearing-{elbows}": colour for elbows, colour in ELBOW_COLOURS.items()}
+    colours[f"bearing-{TABLE}"] = TABLE_COLOUR
     colours["target"] = TARGET_COLOUR
     blocks = {
         scheme: "".join(f"  --{name}: {legible(colour, background)};\n" for name, colour in colours.items())

@@ -11,14 +11,17 @@ export function load(key) {
   return unpacked.get(key);
 }
 
+/** What an arm leans on: "2" is "two elbows". */
+export const bearingNames = new Map(report.bearings);
+
 /** "PPO, 24 V, two elbows". */
 export function runName(key) {
-  const { controller, elbows } = report.runs[key];
-  return `${report.controllers[controller].name}, ${report.elbows[elbows]}`;
+  const { controller, bearing } = report.runs[key];
+  return `${report.controllers[controller].name}, ${bearingNames.get(bearing)}`;
 }
 
-export function runKey(controller, elbows, start) {
-  return `${controller}-${elbows}-${start}`;
+export function runKey(controller, bearing, start) {
+  return `${controller}-${bearing}-${start}`;
 }
 
 async function unpack(key) {

@@ -1,26 +1,26 @@
 /** Energy against error: the optimal front as a line, every run as a point that the replay shows when it is chosen. */
 
 import { axes } from "./chart.js";
-import { report, runKey } from "./data.js";
+import { bearingNames, report } from "./data.js";
 import { quantity } from "./format.js";
 import { limits, makeScale } from "./scale.js";
 import { choose, state, whenRunsChange } from "./state.js";
-import { MARKERS, html, pathOf, svg, whenSized } from "./svg.js";
+import { MARKERS, html, pathOf, svg, whenSeen } from "./svg.js";
 
 const PARETO_MARGIN = { left: 46, right: 12, top: 10, bottom: 40 };
 
-/** Points {key, controller, elbows, error [mm], energy [J], ends} of a regime, out of the benchmark's table or the runs. */
+/** Points {key, controller, bearing, error [mm], energy [J]} of a regime, out of the benchmark's table or the runs. */
 function pointsOf(regime) {
   const { start } = report.regimes[regime];
-  const rows = document.querySelectorAll(`#benchmark-table tr[data-set=nominal][data-regime="${regime}"]`);
-  const figures = new Map([...rows].map((row) => [`${row.dataset.controller}-${row.dataset.elbows}`, row.dataset]));
+  const rows = document.querySelectorAll(`#benchmark-table tr:not([data-set=shifted])[data-regime="${regime}"]`);
+  const figures = new Map([...rows].map((row) => [`${row.dataset.controller}-${row.dataset.bearing}`, row.dataset]));
   return Object.entries(report.runs)
     .filter(([, run]) => run.start === start)
-    .map(([key, { controller, elbows, figures: own }]) => {
-      const row = figures.get(`${controller}-${elbows}`);
+    .map(([key, { controller, bearing, figures: own }]) => {
+      const row = figures.get(`${controller}-${bearing}`);
       const error = row ? Number(row.error) : own[regime].error_mean;
       const energy = row ? Number(row.energy) : own[regime].electrical_energy;
-      return { key, controller, elbows, error, energy };
+      return { key, controller, bearing, error, energy };
     });
 }
 
@@ -28,13 +28,13 @@ export function startPareto() {
   const host = document.getElementById("pareto");
   const said = document.getElementById("pareto-said");
   let regime = "A";
-  const panels = Object.keys(report.elbows).reverse().map((elbows) => {
-    const plot = html("div", { class: "plot", role: "group", "aria-label": `Runs with ${report.elbows[elbows]}; arrow keys move between them` });
-    host.append(html("figure", {}, html("figcaption", {}, html("strong", {}, report.elbows[elbows])), plot));
-    return { elbows: Number(elbows), plot, redraw: whenSized(plot, (width, height) => draw(elbows, plot, width, height)) };
+  const panels = [...bearingNames].map(([bearing, title]) => {
+    const plot = html("div", { class: "plot", role: "group", "aria-label": `Runs with ${title}; arrow keys move between them` });
+    host.append(html("figure", {}, html("figcaption", {}, html("strong", {}, title)), plot));
+    return { plot, picture: whenSeen(plot, (width, height) => draw(bearing, plot, width, height)) };
   });
 
-  function draw(elbows, plot, width, height) {
+  function draw(bearing, plot, width, height) {
     const points = pointsOf(regime);
     const front = report.front.filter((one) => one.start === report.regimes[regime].start && regime !== "B");
     const all = [...points, ...front];
@@ -45,11 +45,11 @@ export function startPareto() {
     root.append(svg("g", { "aria-hidden": "true" }, ...axes(x, y, frame, "")));
     root.append(svg("text", { class: "tick", x: (frame.left + frame.right) / 2, y: height - 6, "text-anchor": "middle" }, "mean error [mm]"));
     root.append(svg("text", { class: "tick", x: frame.left + 4, y: frame.top + 10 }, "energy [J]"));
-    const line = front.filter((one) => one.elbows === Number(elbows)).sort((a, b) => a.error - b.error);
+    const line = front.filter((one) => one.bearing === bearing).sort((a, b) => a.error - b.error);
     const [xs, ys] = [line.map(({ error }) => x(error)), line.map(({ energy }) => y(energy))];
     root.append(svg("path", { class: "curve front", d: pathOf(xs, ys) }));
     line.forEach((one, k) => root.append(svg("circle", { class: "front", cx: xs[k], cy: ys[k], r: 3 }, svg("title", {}, `optimum, energy weight ${one.weight}: ${quantity(one.energy)} J, ${quantity(one.error)} mm`))));
-    const here = points.filter((point) => point.elbows === Number(elbows)).sort((a, b) => a.error - b.error);
+    const here = points.filter((point) => point.bearing === bearing).sort((a, b) => a.error - b.error);
     root.append(...here.map((point) => mark(point, x, y)));
     plot.replaceChildren(root);
     reflect();
@@ -99,7 +99,7 @@ export function startPareto() {
   for (const radio of document.querySelectorAll("input[name=regime]")) {
     radio.addEventListener("change", () => {
       regime = radio.value;
-      panels.forEach(({ redraw }) => redraw());
+      panels.forEach(({ picture }) => picture.redraw());
     });
   }
   whenRunsChange(reflect);

@@ -15,10 +15,13 @@ from numpy.typing import NDArray
 from agents.figures import CASES, SETTLED, VIEWS
 from agents.metrics import REGIMES
 from agents.recording import Recording
+from agents.report.roster import TABLE
 from agents.report.runs import Run
 from agents.style import CONTROLLER_MARKERS, CONTROLLER_NAMES, ELBOW_NAMES
 from elbow_gym.kinematics import joint_positions
 
+BEARINGS = {**{str(elbows): ELBOW_NAMES[elbows] for elbows in CASES}, TABLE: "table that cannot pull"}
+"""What an arm leans on, as the page calls it."""
 LENGTH_UNIT = 1e-4
 """Of the joints' positions in the page [m]; the hand, which errors are taken from, has its own in full."""
 
@@ -56,7 +59,7 @@ def packed(run: Run) -> dict[str, Any]:
     raw = b"".join(block.tobytes() for block in blocks.values())
     return {
         "controller": run.controller,
-        "elbows": run.elbows,
+        "bearing": run.bearing,
         "start": run.start,
         "period": float(run.series.time[1]),
         "elbowJoints": list(run.series.settings.elbow_joints),
@@ -76,6 +79,7 @@ def _plain(value: float) -> float | None:
 def payload(runs: Sequence[Run], results: Path) -> dict[str, Any]:
     """All of the page's data, JSON types only."""
     controllers = list(dict.fromkeys(run.controller for run in runs))
+    shown = {run.bearing for run in runs}
     longest = max(runs, key=lambda run: run.series.time[-1])
     return {
         "runs": {run.key: packed(run) for run in runs},
@@ -86,7 +90,7 @@ def payload(runs: Sequence[Run], results: Path) -> dict[str, Any]:
             name: {"name": CONTROLLER_NAMES.get(name, name), "marker": CONTROLLER_MARKERS.get(name, "o")}
             for name in controllers
         },
-        "elbows": {str(elbows): ELBOW_NAMES[elbows] for elbows in CASES},
+        "bearings": [[name, title] for name, title in BEARINGS.items() if name in shown],
         "regimes": {
             regime.name: {"start": regime.start, "since": regime.since, "meaning": regime.meaning} for regime in REGIMES
         },
@@ -119,7 +123,7 @@ def front(path: Path) -> list[dict[str, Any]]:
     with path.open(newline="", encoding="utf-8") as handle:
         return [
             {
-                "elbows": int(row["elbows"]),
+                "bearing": row["elbows"],
                 "start": row["start"],
                 "weight": float(row["energy_weight"]),
                 "error": 1e3 * float(row["error_mean"]),

@@ -2,7 +2,7 @@
 
 import { JointBars, powerAt } from "./bars.js";
 import { TimeChart } from "./chart.js";
-import { column, report, runKey, runName, valueAt } from "./data.js";
+import { bearingNames, column, report, runKey, runName, valueAt } from "./data.js";
 import { quantity, seconds } from "./format.js";
 import { Scene } from "./scene.js";
 import { choose, colours, setSince, setTime, state, whenRunsChange, whenTimeChanges } from "./state.js";
@@ -24,7 +24,7 @@ const QUANTITIES = {
   energy: ["energy used", "J", (run, time) => valueAt(run, run.energy, time) - valueAt(run, run.energy, state.since)],
   power: ["power", "W", (run, time) => powerAt(run, 0, time)],
   error: ["hand error", "mm", (run, time) => valueAt(run, run.error, time)],
-  height: ["hand above target", "mm", (run, time) => valueAt(run, run.height, time)],
+  height: ["height error", "mm", (run, time) => valueAt(run, run.height, time)],
 };
 
 export function startReplay() {
@@ -47,6 +47,7 @@ export function startReplay() {
     selects.reflect();
     charts.show(paints);
     bars.choose(charts.joint);
+    bars.show(state.runs, state.since);
     scene.show(state.runs);
     showNumbers();
     element("scene").setAttribute("aria-label", `The arm in three dimensions: ${names().join(" and ")}. Arrow keys turn the view, plus and minus zoom.`);
@@ -79,7 +80,7 @@ function makeCharts() {
     energy: make("chart-energy", { title: "Energy used", unit: "J" }),
     error: make("chart-error", { title: "Hand error", unit: "mm", kind: "log" }),
     power: make("chart-power", { title: "Power, all joints", unit: "W", kind: "signed" }),
-    force: make("chart-force", { title: "Force of the table (shaded: it pulls)", unit: "N", zones: pulls }),
+    force: make("chart-force", { title: "Force of the table (shaded: it pulls)", unit: "N", zones: pulls, empty: "no elbow is held on the table" }),
   };
   return {
     joint: 0,
@@ -161,21 +162,21 @@ function announce() {
   element("announcement").textContent = `At ${seconds(state.time)}. ${spoken.join(". ")}.`;
 }
 
-/** The selects of controller, elbows and start, and the presets. */
+/** The selects of controller, elbows or table, and start, and the presets. */
 function connectSelects() {
   const options = (entries) => entries.map(([value, text]) => html("option", { value }, text));
-  const exists = (controller, elbows) => runKey(controller, elbows, element("start").value) in report.runs;
+  const exists = (controller, bearing) => runKey(controller, bearing, element("start").value) in report.runs;
   const controllers = Object.entries(report.controllers).map(([key, { name }]) => [key, name]);
   SLOTS.forEach((slot, k) => {
     element(`controller-${slot}`).append(...options(k ? [["", "none"], ...controllers] : controllers));
-    element(`elbows-${slot}`).append(...options(Object.entries(report.elbows).reverse()));
+    element(`bearing-${slot}`).append(...options([...bearingNames]));
   });
   const chosen = (slot) => {
     const controller = element(`controller-${slot}`).value;
     if (!controller) return null;
-    const wanted = element(`elbows-${slot}`).value;
-    const elbows = [wanted, "2", "1", "0"].find((count) => exists(controller, count));
-    return elbows === undefined ? null : runKey(controller, elbows, element("start").value);
+    const wanted = element(`bearing-${slot}`).value;
+    const bearing = [wanted, ...bearingNames.keys()].find((one) => exists(controller, one));
+    return bearing === undefined ? null : runKey(controller, bearing, element("start").value);
   };
   for (const select of document.querySelectorAll("#choice select")) {
     select.addEventListener("change", () => choose(chosen("a"), chosen("b")));
@@ -193,10 +194,10 @@ function connectSelects() {
       SLOTS.forEach((slot, k) => {
         const run = state.keys[k] && report.runs[state.keys[k]];
         element(`controller-${slot}`).value = run ? run.controller : "";
-        element(`elbows-${slot}`).disabled = !run;
+        element(`bearing-${slot}`).disabled = !run;
         if (!run) return;
-        element(`elbows-${slot}`).value = run.elbows;
-        for (const option of element(`elbows-${slot}`).options) option.disabled = !exists(run.controller, option.value);
+        element(`bearing-${slot}`).value = run.bearing;
+        for (const option of element(`bearing-${slot}`).options) option.disabled = !exists(run.controller, option.value);
       });
       for (const button of element("presets").children) {
         button.setAttribute("aria-pressed", String(button.dataset.pair === state.keys.join()));

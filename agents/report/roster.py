@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,41 +18,64 @@ from elbow_gym.vector_env import ElbowArmVectorEnv
 
 SHOWN_AS = {"pd": "pd_24v"}
 """Names in the benchmark's tables where they differ from the command line's."""
-LEARNED = ("ppo", "sac")
-# What a control period costs beside the others' [1], for an honest time left.
-EFFORT = {"pd_gravity": 2.5, "pd_smooth": 2.0, "computed_torque": 3.0, "computed_torque_posture": 15.0}
+TABLE = "table"
+"""Name of the compliant table where others have their number of elbows."""
+SHIPPED_NAME = re.compile(r"(?P<controller>\w+)_(?P<task>elbows(?P<elbows>\d+)|table|random)_seed\d+")
+# What one episode takes beside one of the paper's PD without a limit, for an honest time left.
+EFFORT = {
+    "pd_paper": 1.0,
+    "pd": 0.2,
+    "pd_smooth": 0.4,
+    "pd_gravity": 0.5,
+    "computed_torque": 0.15,
+    "computed_torque_posture": 0.8,
+    "lqr": 0.3,
+}
+LEAST_EFFORT = 0.05
+EPISODE = 10_000
+"""Units of work that one episode of effort 1 counts."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A controller at one elbow count; its runs from all starts are one job."""
+    """A controller in one environment; its runs from all starts are one job."""
 
     name: str
     """As `agents.evaluate.named_controller` knows it, or "lqr"."""
     elbows: int
+    """On the rigid table."""
     results: Path
     """Folder of the benchmark's results."""
+    env: str = "ElbowArm-v0"
+    """Id of the environment that a learned one was trained in; on the compliant table, where all play."""
 
     @property
     def controller(self) -> str:
         """Its name in the benchmark's tables and in `agents.style`."""
-        return SHOWN_AS.get(self.name, self.name)
+        suffix = "_random" if self.env == "ElbowArmRandom-v0" else ""
+        return SHOWN_AS.get(self.name, self.name) + suffix
+
+    @property
+    def bearing(self) -> str:
+        """What the arm leans on: its number of elbows, or `TABLE`."""
+        return TABLE if self.env == "ElbowArmTable-v0" else str(self.elbows)
 
     @property
     def size(self) -> int:
-        """Work to be done, in control periods of the PD."""
-        horizon = 250 if self.name not in CLASSICAL else Settings(**CLASSICAL[self.name][0]).horizon
-        return round(EFFORT.get(self.name, 1.0) * horizon * len(STARTS))
+        """Work to be done, all episodes together."""
+        return round(EPISODE * EFFORT.get(self.name, LEAST_EFFORT)) * len(STARTS)
 
     def contender(self) -> tuple[Settings, Callable[[ElbowArmVectorEnv], Controller]]:
         """The environment and the maker of the controller."""
-        if self.name != "lqr":
-            return named_controller(self.name, self.elbows)
+        if self.name == "lqr":
 
-        def follow(env: ElbowArmVectorEnv) -> Controller:
-            return TimeVaryingLQR(env, Trajectory.load(trajectory(self.results, self.elbows, env.settings.start)))
+            def follow(env: ElbowArmVectorEnv) -> Controller:
+                return TimeVaryingLQR(env, Trajectory.load(trajectory(self.results, self.elbows, env.settings.start)))
 
-        return Settings(elbows=self.elbows), follow
+            return Settings(elbows=self.elbows), follow
+        settings, make = named_controller(self.name, self.elbows, self.env)
+        # Who was trained on drawn arms and circles is shown with the paper's.
+        return (Settings(elbows=self.elbows) if self.env == "ElbowArmRandom-v0" else settings), make
 
 
 def trajectory(results: Path, elbows: int, start: str) -> Path:
@@ -60,18 +84,28 @@ def trajectory(results: Path, elbows: int, start: str) -> Path:
 
 
 def roster(results: Path) -> list[Entry]:
-    """The classical controllers, and the LQR and the learned policies as far as their files are there."""
+    """The classical controllers, and the LQR and the learned policies as far as their files are there.
+
+    Where a policy for the compliant table is shipped, the classical ones but the 10 kHz PD play on it too.
+    """
     entries = [Entry(name, elbows, results) for name in CLASSICAL for elbows in CASES]
     entries += [
         Entry("lqr", elbows, results)
         for elbows in CASES
         if all(trajectory(results, elbows, start).is_file() for start in STARTS)
     ]
-    shipped = shipped_policies()
-    entries += [
-        Entry(name, elbows, results)
-        for name in LEARNED
-        for elbows in CASES
-        if any(policy.startswith(f"{name}_elbows{elbows}") for policy in shipped)
-    ]
+    learned, tabletop = [], []
+    named = [found for policy in shipped_policies() if (found := SHIPPED_NAME.fullmatch(policy))]
+    # Several seeds make one entry, which plays the best.
+    for name, task, elbows in {found.group("controller", "task", "elbows") for found in named}:
+        if task == "table":
+            tabletop.append(Entry(name, 0, results, "ElbowArmTable-v0"))
+        elif task == "random":
+            learned.append(Entry(name, 2, results, "ElbowArmRandom-v0"))
+        else:
+            learned.append(Entry(name, int(elbows), results))
+    entries += sorted(learned, key=lambda entry: (entry.controller, -entry.elbows))
+    if tabletop:
+        entries += [Entry(name, 0, results, "ElbowArmTable-v0") for name in CLASSICAL if name != "pd_paper"]
+        entries += sorted(tabletop, key=lambda entry: entry.controller)
     return entries

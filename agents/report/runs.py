@@ -11,7 +11,7 @@ from agents.evaluate import RECORDING_PERIOD
 from agents.figures import SERIES_PERIOD, thinned
 from agents.metrics import REGIMES, metrics
 from agents.recording import Recording, record
-from agents.report.roster import Entry
+from agents.report.roster import TABLE, Entry
 from agents.reproduce import RECORD_PERIOD, measure
 from agents.workers import Job, in_processes
 from elbow_gym.settings import STARTS
@@ -26,7 +26,8 @@ class Run:
 
     controller: str
     """As in the benchmark's tables."""
-    elbows: int
+    bearing: str
+    """What the arm leans on: "2", "1" or "0" elbows, or `agents.report.roster.TABLE`."""
     start: str
     """The environment's `start`."""
     series: Recording
@@ -39,7 +40,7 @@ class Run:
     @property
     def key(self) -> str:
         """Its name in the page."""
-        return f"{self.controller}-{self.elbows}-{self.start}"
+        return f"{self.controller}-{self.bearing}-{self.start}"
 
 
 def collect(entries: Sequence[Entry], progress: Callable[[int], Any]) -> list[Run]:
@@ -51,7 +52,7 @@ def collect(entries: Sequence[Entry], progress: Callable[[int], Any]) -> list[Ru
 def play(entry: Entry, progress: Callable[[int], Any]) -> list[Run]:
     """An entry's runs from all starts; `progress` is told the entry's size in parts."""
     settings, make = entry.contender()
-    paper = entry.name in PAPER_PD
+    paper = entry.name in PAPER_PD and entry.bearing != TABLE
     period = RECORD_PERIOD if paper else RECORDING_PERIOD
     every = max(1, round(settings.control_frequency * period))
     runs, told = [], 0
@@ -72,5 +73,5 @@ def play(entry: Entry, progress: Callable[[int], Any]) -> list[Run]:
         }
         measured = measure(recording) if paper else None
         series = thinned(recording, SERIES_PERIOD)
-        runs.append(Run(entry.controller, entry.elbows, start, series, figures, measured))
+        runs.append(Run(entry.controller, entry.bearing, start, series, figures, measured))
     return runs

@@ -32,7 +32,7 @@ export function limits(kind, values) {
 
 const TICKS = {
   linear(low, high, length) {
-    const rough = (high - low) / Math.max(2, length / 45);
+    const rough = (high - low) / Math.max(2, length / 34);
     const power = 10 ** Math.floor(Math.log10(rough));
     const step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough);
     const ticks = [];
@@ -53,7 +53,9 @@ const TICKS = {
     const room = length / ((high > 1 ? largest : 1) + (low < -1 ? largest : 1));
     const step = room > 22 ? 1 : room > 12 ? 2 : 3;
     const ticks = [0];
-    for (let k = 0; k <= largest; k += step) ticks.push(10 ** k, -(10 ** k));
+    // 1 stands close to 0.
+    const first = room > 34 ? 0 : step;
+    for (let k = first; k <= largest; k += step) ticks.push(10 ** k, -(10 ** k));
     return ticks;
   },
 };

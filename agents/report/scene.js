@@ -8,6 +8,9 @@ const METRES_PER_NEWTON = 0.03;
 const LONGEST_ARROW = 0.55;
 /** Radius of the links at the base and at the hand [m]. */
 const THICKNESS = [0.05, 0.02];
+/** In pixels: close by, the path matters more than the links. */
+const THICKEST = 24;
+const WIDEST_DOT = 6;
 
 export class Scene {
   constructor(canvas) {
@@ -61,6 +64,7 @@ export class Scene {
     this.runs.forEach((run, slot) => this.drawPath(run, this.slotColour(slot)));
     const farFirst = chains.map((points, slot) => [this.depthOf(points), slot]).sort(([a], [b]) => b - a);
     for (const [, slot] of farFirst) this.drawArm(this.runs[slot], chains[slot], this.slotColour(slot));
+    this.drawForces(chains);
   }
 
   slotColour(slot) {
@@ -134,7 +138,7 @@ export class Scene {
     for (const [from, to, k] of links) {
       const share = k / (points.length - 1);
       const radius = THICKNESS[0] + (THICKNESS[1] - THICKNESS[0]) * share;
-      const width = Math.max(3, radius * (from[3] + to[3]));
+      const width = Math.min(THICKEST, Math.max(3, radius * (from[3] + to[3])));
       for (const [stroke, extra] of [[colours.panel, 3], [colour, 0]]) {
         context.beginPath();
         context.moveTo(from[0], from[1]);
@@ -142,28 +146,46 @@ export class Scene {
         Object.assign(context, { strokeStyle: stroke, lineWidth: width + extra }).stroke();
       }
     }
-    seen.slice(1, -1).forEach((point, k) => point && this.dot(point, Math.max(2, (0.018 - 0.001 * k) * point[3]), colours.panel, colour));
+    seen.slice(1, -1).forEach((point, k) => point && this.dot(point, Math.min(WIDEST_DOT, Math.max(2, (0.018 - 0.001 * k) * point[3])), colours.panel, colour));
     const hand = seen[seen.length - 1];
-    if (hand) this.dot(hand, Math.max(3.5, 0.02 * hand[3]), colour, colours.ink);
-    run.elbowJoints.forEach((joint, k) => this.drawForce(points[joint - 1], valueAt(run, run.force, this.time, run.elbowJoints.length, k), joint));
+    if (hand) this.dot(hand, Math.min(WIDEST_DOT, Math.max(3.5, 0.02 * hand[3])), colour, colours.ink);
   }
 
-  /** An arrow under the elbow: toward it where the table pushes, away from it where it pulls. */
-  drawForce(point, force, joint) {
+  /** The table's force on every elbow, and under the arrows what they come to. */
+  drawForces(chains) {
+    const words = new Map();
+    this.runs.forEach((run, slot) => {
+      run.elbowJoints.forEach((joint, k) => {
+        const force = valueAt(run, run.force, this.time, run.elbowJoints.length, k);
+        const end = this.drawForce(chains[slot][joint - 1], force);
+        if (!end) return;
+        const said = words.get(joint) || { x: end[0], y: end[1], parts: [] };
+        const name = this.runs.length > 1 ? `${"AB"[slot]} ` : "";
+        said.parts.push(`${name}${force < 0 ? "↓" : "↑"} ${quantity(Math.abs(force))} N`);
+        words.set(joint, { ...said, y: Math.max(said.y, end[1]) });
+      });
+    });
+    for (const [joint, { x, y, parts }] of words) {
+      [`joint ${joint}`, ...parts].forEach((line, row) => this.label(line, x, y + 18 + 15 * row));
+    }
+  }
+
+  /** An arrow under the elbow: toward it where the table pushes, away from it where it pulls; gives its lower end. */
+  drawForce(point, force) {
     const { context, colours } = this;
     const below = [point[0], point[1], point[2] - Math.min(LONGEST_ARROW, 0.08 + METRES_PER_NEWTON * Math.abs(force))];
     const [elbow, tail] = [this.project(point), this.project(below)];
-    if (!elbow || !tail) return;
+    if (!elbow || !tail) return null;
     const colour = force < 0 ? colours.pull : colours.push;
     this.line([point, below], colour, 3.5);
-    this.dot(elbow, Math.max(5, 0.035 * elbow[3]), colour, colours.panel);
+    this.dot(elbow, Math.min(2 * WIDEST_DOT, Math.max(5, 0.035 * elbow[3])), colour, colours.panel);
     const [tip, back] = force < 0 ? [tail[1] + 5, -11] : [elbow[1] + 8, 11];
     context.beginPath();
     context.moveTo(elbow[0], tip);
     context.lineTo(elbow[0] - 6.5, tip + back);
     context.lineTo(elbow[0] + 6.5, tip + back);
     Object.assign(context, { fillStyle: colour }).fill();
-    this.label(`joint ${joint} ${force < 0 ? "pulled down" : "pushed up"} ${quantity(Math.abs(force))} N`, tail[0], tail[1] + 20);
+    return [tail[0], Math.max(tail[1], tip)];
   }
 
   label(text, x, y) {

@@ -40,11 +40,11 @@ export function setSince(since) {
   setTime(state.time);
 }
 
-/** CSS colours of the two runs: by controller where those differ, else by elbows. */
+/** CSS colours of the two runs: by controller where those differ, else by what the arm leans on. */
 export function colours([first, second]) {
   const [one, other] = [first, second].map((key) => key && report.runs[key]);
-  if (other && one.controller === other.controller && one.elbows !== other.elbows) {
-    return [one, other].map(({ elbows }) => `var(--elbows-${elbows})`);
+  if (other && one.controller === other.controller && one.bearing !== other.bearing) {
+    return [one, other].map(({ bearing }) => `var(--bearing-${bearing})`);
   }
   const of = ({ controller }) => `var(--controller-${controller}, var(--ink))`;
   if (other && one.controller === other.controller) return [of(one), "var(--quiet)"];

@@ -40,31 +40,36 @@ export const MARKERS = {
   P: "M-2-6H2V-2H6V2H2V6H-2V2H-6V-2H-2Z",
   X: "M-5.5-3L-3-5.5L0-2.5L3-5.5L5.5-3L2.5 0L5.5 3L3 5.5L0 2.5L-3 5.5L-5.5 3L-2.5 0Z",
   h: "M0-6L5.2-3V3L0 6L-5.2 3V-3Z",
+  ">": "M-4.5-5.5V5.5L5.5 0Z",
+  "<": "M4.5-5.5V5.5L-5.5 0Z",
+  p: "M0-6L5.7-1.9L3.5 4.9H-3.5L-5.7-1.9Z",
+  H: "M-6 0L-3-5.2H3L6 0L3 5.2H-3Z",
   "*": "M0-7.5L1.8-2.4L7.1-2.3L2.9.9L4.4 6.1L0 3L-4.4 6.1L-2.9.9L-7.1-2.3L-1.8-2.4Z",
 };
 
-/** Calls `draw` with an element's size in pixels, now and whenever it changes, while the element can be seen. */
-export function whenSized(element, draw) {
+/**
+ * Draws what is in view: `draw(width, height)` is called when an element comes into view and when its size changes.
+ *
+ * Gives `seen()`, and `redraw()` for when the content has changed.
+ */
+export function whenSeen(element, draw) {
   let seen = false;
   let drawn = "";
   const redraw = () => {
-    const size = [element.clientWidth, element.clientHeight];
-    if (seen && size[0] > 0 && size.join() !== drawn) {
-      drawn = size.join();
-      draw(...size);
-    }
-  };
-  new ResizeObserver(redraw).observe(element);
-  const watcher = new IntersectionObserver(
-    (entries) => {
-      seen = entries[entries.length - 1].isIntersecting;
-      redraw();
-    },
-    { rootMargin: "200px" },
-  );
-  watcher.observe(element);
-  return () => {
     drawn = "";
+    update();
+  };
+  const update = () => {
+    const size = [element.clientWidth, element.clientHeight];
+    if (!seen || !size[0] || size.join() === drawn) return;
+    drawn = size.join();
+    draw(...size);
+  };
+  new ResizeObserver(update).observe(element);
+  const watch = (entries) => {
+    seen = entries[entries.length - 1].isIntersecting;
     redraw();
   };
+  new IntersectionObserver(watch, { rootMargin: "200px" }).observe(element);
+  return { redraw, seen: () => seen };
 }

@@ -9,11 +9,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 from agents.figures import CASES
+from agents.report.payload import BEARINGS
+from agents.report.roster import TABLE
 from agents.report.runs import Run
 from agents.reproduce import case_numbers, quantities
 from agents.style import CONTROLLER_NAMES, ELBOW_NAMES
 from agents.verdict import Numbers, disclosures, verdict
 
+PARTS = {"nominal": "energy", "shifted": "energy_shifted", TABLE: "energy_table"}
+"""Parts of the benchmark and the files of their results."""
+LEARNED = ("ppo", "sac")
 PAPER_RUNS = {"paper": ("pd_paper", "paper"), "on target": ("pd_paper", "on_target"), "24 V": ("pd_24v", "paper")}
 """Controller and start of `agents.reproduce.RUNS`."""
 
@@ -42,10 +47,10 @@ COLUMNS = (
 
 def paper_numbers(runs: Sequence[Run]) -> dict[int, Numbers]:
     """The paper's numbers by elbow count, of the counts whose three runs are all there."""
-    measured = {(run.controller, run.start, run.elbows): run.measured for run in runs}
+    measured = {(run.controller, run.start, run.bearing): run.measured for run in runs}
     found = {}
     for elbows in CASES:
-        cases = {name: measured.get((*key, elbows)) for name, key in PAPER_RUNS.items()}
+        cases = {name: measured.get((*key, str(elbows))) for name, key in PAPER_RUNS.items()}
         complete = {name: values for name, values in cases.items() if values is not None}
         if len(complete) == len(cases):
             found[elbows] = case_numbers(complete)
@@ -60,14 +65,14 @@ def headline(numbers: Mapping[int, Numbers], runs: Sequence[Run]) -> str:
             one.energy_tracking,
             one.error_rms,
             f"pd_paper-{elbows}-paper",
-            f"elbows-{elbows}",
+            f"bearing-{elbows}",
         )
         for elbows, one in numbers.items()
     ]
-    best = [run for run in runs if run.controller in ("ppo", "sac") and run.start == "paper" and run.elbows == 2]
+    best = [run for run in runs if run.controller in LEARNED and run.start == "paper" and run.bearing == "2"]
     if best:
         run = max(best, key=lambda run: run.figures["A"]["return"])
-        name = f"{CONTROLLER_NAMES[run.controller].split(',')[0]}, {ELBOW_NAMES[run.elbows]}"
+        name = f"{CONTROLLER_NAMES[run.controller].split(',')[0]}, {BEARINGS[run.bearing]}"
         late = run.figures["B"]
         tiles.append((name, late["electrical_energy"], late["error_rms"], run.key, f"controller-{run.controller}"))
     return "".join(
@@ -103,9 +108,7 @@ def paper_table(numbers: Mapping[int, Numbers]) -> str:
 
 def benchmark_table(results: Path, runs: Sequence[Run]) -> str:
     """The rows of energy.csv and energy_shifted.csv, each controller's name a button that shows its run."""
-    parts = {
-        name: _rows(results / f"{file}.csv") for name, file in (("nominal", "energy"), ("shifted", "energy_shifted"))
-    }
+    parts = {part: _rows(results / f"{file}.csv") for part, file in PARTS.items()}
     if not parts["nominal"]:
         return "<p>There are no results: <code>python -m benchmarks energy</code> makes them.</p>"
     # "name [unit]"; beside it stand "name [unit] low" and "... high".
@@ -117,17 +120,17 @@ def benchmark_table(results: Path, runs: Sequence[Run]) -> str:
         f"{'' if units[column.name] == '-' else f' [{units[column.name]}]'}</button></th>"
         for column in shown
     )
-    for name in ("regime", "elbows", "controller"):
+    for name in ("regime", "leans on", "controller"):
         head = f'<th scope=col data-sort><button type="button">{name}</button></th>{head}'
     starts = {regime: run.start for run in runs for regime in run.figures}
     keys = {run.key for run in runs}
     body = ""
     for part, rows in parts.items():
         for row in rows:
-            key = f"{row['controller']}-{row['elbows']}-{starts.get(row['regime'])}"
-            body += _row(
-                row, part, key if key in keys else None, [(column.name, units[column.name]) for column in shown]
-            )
+            bearing = TABLE if part == TABLE else row["elbows"]
+            key = f"{row['controller']}-{bearing}-{starts.get(row['regime'])}"
+            columns = [(column.name, units[column.name]) for column in shown]
+            body += _row(row, part, bearing, key if key in keys else None, columns)
     return f"<table id=benchmark-table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table>"
 
 
@@ -138,17 +141,17 @@ def _rows(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(handle))
 
 
-def _row(row: Mapping[str, str], part: str, key: str | None, columns: Sequence[tuple[str, str]]) -> str:
+def _row(row: Mapping[str, str], part: str, bearing: str, key: str | None, columns: Sequence[tuple[str, str]]) -> str:
     name = escape(CONTROLLER_NAMES.get(row["controller"], row["controller"]))
     label = name if key is None else f'<button type="button" data-run="{key}">{name}</button>'
-    cells = f"<td>{escape(row['elbows'])}</td><td>{escape(row['regime'])}</td>"
+    cells = f"<td>{'table' if bearing == TABLE else escape(bearing)}</td><td>{escape(row['regime'])}</td>"
     for column, unit in columns:
         value = row.get(f"{column} [{unit}]", "")
         low, high = (row.get(f"{column} [{unit}] {end}", "") for end in ("low", "high"))
         interval = f' title="95 % interval {float(low):.4g} to {float(high):.4g}"' if low and high else ""
         number = float(value) if value not in ("", "nan") else None
         cells += f'<td data-value="{"" if number is None else value}"{interval}>{_number(number)}</td>'
-    tags = f'data-set="{part}" data-regime="{escape(row["regime"])}" data-elbows="{escape(row["elbows"])}"'
+    tags = f'data-set="{part}" data-regime="{escape(row["regime"])}" data-bearing="{escape(bearing)}"'
     tags += f' data-controller="{escape(row["controller"])}"'
     tags += f' data-error="{row.get("error_mean [mm]", "")}" data-energy="{row.get("electrical_energy [J]", "")}"'
     return f"<tr {tags}><th scope=row>{label}</th>{cells}</tr>\n"

@@ -1,0 +1,31 @@
+"""`python -m agents report`: plays every controller and writes the page."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from agents.files import write_text
+from agents.report.page import page
+from agents.report.roster import roster
+from agents.report.runs import collect
+from agents.reproduce import RESULTS
+
+
+def report(output: Path, results: Path = RESULTS) -> Path:
+    """Plays every controller without start noise and writes the page, whole or not at all.
+
+    Args:
+        output: the HTML file.
+        results: folder of the benchmark's results: its tables, its front and the trajectories that the LQR follows.
+    """
+    from tqdm import tqdm
+
+    entries = roster(results)
+    layout = "{desc} {percentage:3.0f}%|{bar}| {elapsed} elapsed, {remaining} left"
+    with tqdm(total=sum(entry.size for entry in entries), desc="playing", bar_format=layout, file=sys.stderr) as bar:
+        runs = collect(entries, bar.update)
+        bar.set_description("writing")
+    write_text(output, page(runs, results))
+    print(f"{output}: {len(runs)} runs, {output.stat().st_size / 1e6:.1f} MB")
+    return output
