@@ -152,6 +152,7 @@ class PPOSettings(AlgorithmSettings):
         """Stable-Baselines3's PPO."""
         arguments = self._common(env, seed, log, "vf")
         arguments["policy_kwargs"]["log_std_init"] = self.log_std_init
+        arguments["policy_kwargs"]["optimizer_kwargs"]["eps"] = 1e-5
         own = ("n_steps", "batch_size", "n_epochs", "gae_lambda", "clip_range", "ent_coef", "vf_coef", "max_grad_norm")
         own += ("normalize_advantage", "target_kl")
         return self.model_class(**arguments, **{name: getattr(self, name) for name in own})

@@ -25,7 +25,7 @@ ACTIVATIONS = {
     "tanh": np.tanh,
     "relu": lambda x: np.maximum(x, 0.0),
     "elu": lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0))),
-    "silu": lambda x: x / (1.0 + np.exp(-x)),
+    "silu": lambda x: x * np.exp(-np.logaddexp(0.0, -x)),
 }
 OUTPUTS = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
 """How the last layer becomes an action: PPO's is clipped, SAC's squashed."""

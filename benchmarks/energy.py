@@ -8,17 +8,19 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from agents.evaluate import BENCHMARK_SEEDS, SHIFTED, in_all_regimes
 from agents.files import write_text, write_whole
 from agents.metrics import REGIMES, UNITS
+from agents.workers import Job, Tell, in_processes
 from benchmarks import breakdown, cache, energy_figure, energy_table, learning, pareto
+from benchmarks.cache import Results
 from benchmarks.context import machine, versions
-from benchmarks.lineup import PARTS, Cell, cells, contenders, sweep
+from benchmarks.lineup import PARTS, Cell, Contender, cells, contenders, starts, sweep, work
 from benchmarks.optimal import RESULTS
 from benchmarks.optimal import Cell as Bound
 from benchmarks.optimal import cached as cached_bound
@@ -53,18 +55,18 @@ def bound(cell: Cell, regime: str) -> float | None:
     return None if figures is None or cell.part != "nominal" else float(figures["closed_loop"])
 
 
-def rows_of(cell: Cell, seeds: Sequence[int], folder: Path, fresh: bool = False) -> list[Row]:
-    """A cell's rows, from the results in `folder` where the same was measured before.
+def play(cell: Cell, seeds: Sequence[int], folder: Path, fresh: bool, tell: Tell) -> list[Results]:
+    """The results of a cell's contenders, each from `folder` where the same was measured before.
 
     Args:
         cell: what is played.
         seeds: of the episodes.
-        folder: where results of cells are kept.
+        folder: where results are kept.
         fresh: measure again all the same.
+        tell: called with the units of work done, `work` in all when all is measured.
     """
-    players = contenders(cell)
     measured = []
-    for player in players:
+    for player in contenders(cell):
         question = {
             "settings": player.settings.arguments,
             "identity": player.identity,
@@ -75,9 +77,31 @@ def rows_of(cell: Cell, seeds: Sequence[int], folder: Path, fresh: bool = False)
         name = cache.key(json.loads(json.dumps(question)))
         results = None if fresh else cache.load(name, folder)
         if results is None:
-            results = in_all_regimes(player.settings, player.make, seeds, regimes=cell.regimes)
+            results = in_all_regimes(player.settings, player.make, seeds, _counted(player, tell), cell.regimes)
             cache.store(name, results, folder)
+        else:
+            tell(len(starts(cell)) * player.work)
         measured.append(results)
+    return measured
+
+
+def _counted(player: Contender, tell: Tell) -> Callable[[int, int], None]:
+    """A callback for `record` that tells the work done since its last call."""
+    before = 0
+
+    def progress(done: int, total: int) -> None:
+        nonlocal before
+        # A second run, from the other start, counts from zero again.
+        before = before if before < done else 0
+        tell(player.work * done // total - player.work * before // total)
+        before = done
+
+    return progress
+
+
+def rows_of(cell: Cell, measured: Sequence[Results]) -> list[Row]:
+    """A cell's rows from the results of its contenders."""
+    players = contenders(cell)
     rows = []
     for regime in cell.regimes:
         values = {name: np.stack([results[regime.name][name] for results in measured]) for name in UNITS}
@@ -106,16 +130,20 @@ def rows_of(cell: Cell, seeds: Sequence[int], folder: Path, fresh: bool = False)
 
 
 def measure(
-    seeds: Sequence[int], progress: Callable[[str, int], Any], folder: Path = cache.FOLDER, fresh: bool = False
+    seeds: Sequence[int],
+    tell: Tell,
+    folder: Path = cache.FOLDER,
+    fresh: bool = False,
+    parallel: bool = True,
 ) -> list[Row]:
-    """Plays all cells; `progress` gets a cell's title and the number of cells done."""
-    rows: list[Row] = []
+    """Plays all cells, one on each core when `parallel`; `tell` gets the units of `work` done."""
     everything = cells() + sweep()
-    for k, cell in enumerate(everything):
-        progress(cell.title, k)
-        rows += rows_of(cell, seeds, folder, fresh)
-    progress("done", len(everything))
-    return rows
+    if parallel:
+        jobs = {cell: Job(partial(play, cell, seeds, folder, fresh), work(cell)) for cell in everything}
+        measured = in_processes(jobs, tell)
+    else:
+        measured = {cell: play(cell, seeds, folder, fresh, tell) for cell in everything}
+    return [row for cell in everything for row in rows_of(cell, measured[cell])]
 
 
 def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path) -> None:
@@ -156,7 +184,11 @@ def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path
 
 
 def energy(
-    output: Path = RESULTS, episodes: int = len(BENCHMARK_SEEDS), fresh: bool = False, folder: Path = cache.FOLDER
+    output: Path = RESULTS,
+    episodes: int = len(BENCHMARK_SEEDS),
+    fresh: bool = False,
+    folder: Path = cache.FOLDER,
+    parallel: bool = True,
 ) -> list[Row]:
     """Runs the comparison, prints the tables and writes the results. Returns the rows.
 
@@ -165,19 +197,16 @@ def energy(
         episodes: start poses, one fixed seed each.
         fresh: play what was played before, too.
         folder: where results of single cells are kept.
+        parallel: one cell on each core.
     """
     from rich.console import Console
     from tqdm import tqdm
 
     seeds = [BENCHMARK_SEEDS[0] + k for k in range(episodes)]
     started = time.monotonic()
-    with tqdm(total=len(cells()) + len(sweep()), file=sys.stderr, unit="cell") as bar:
-
-        def progress(title: str, done: int) -> None:
-            bar.set_description(title)
-            bar.update(done - bar.n)
-
-        rows = measure(seeds, progress, folder, fresh)
+    total = sum(work(cell) for cell in cells() + sweep())
+    with tqdm(total=total, file=sys.stderr, bar_format="{l_bar}{bar}| {elapsed} < {remaining}") as bar:
+        rows = measure(seeds, bar.update, folder, fresh, parallel)
     save(rows, seeds, time.monotonic() - started, output)
     # Wider than a pipe's 80 columns, which would cut the figures.
     console = Console(width=max(Console().width, 120))

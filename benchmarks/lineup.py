@@ -14,7 +14,6 @@ from agents.lqr import TimeVaryingLQR
 from agents.metrics import REGIMES, Regime
 from agents.pd import PAPER_KD, PAPER_KP, PDController
 from agents.policy import SHIPPED, load_policy, shipped_policies, shipped_seeds
-from agents.style import ELBOW_NAMES
 from agents.trajectory import Trajectory
 from benchmarks import optimal
 from elbow_gym.settings import Settings
@@ -29,6 +28,8 @@ PARTS = {
 """Parts of the benchmark and what they are."""
 GAINS = (0.25, 0.5, 2.0, 4.0)
 """By which both gains of the paper's PD are multiplied in the sweep beside it."""
+EFFORT = {"pd_smooth": 2.0, "pd_gravity": 2.5, "computed_torque": 3.0, "computed_torque_posture": 8.0, "lqr": 8.0}
+"""Of a control period, times the PD's, for an honest time left; starting takes part of it."""
 SHIPPED_NAME = re.compile(r"(?P<controller>[a-z]+(_[a-z]+)??)_(?P<task>elbows\d+|table|random)")
 
 
@@ -41,12 +42,6 @@ class Cell:
     part: str = "nominal"
     gain: float = 1.0
     """Of the PD's gains, times the paper's."""
-
-    @property
-    def title(self) -> str:
-        """For the progress bar."""
-        gain = f", gains x {self.gain:g}" if self.gain != 1.0 else ""
-        return f"{self.controller}{gain}, {ELBOW_NAMES[self.elbows]}, {self.part}"
 
     @property
     def regimes(self) -> tuple[Regime, ...]:
@@ -71,8 +66,15 @@ class Contender:
     make: Callable[[ElbowArmVectorEnv], Controller]
     identity: str
     """What it is made of, beyond the code; results are taken over only where it is the same."""
+    effort: float = 1.0
+    """Of a control period, times the PD's."""
     seed: int | None = None
     """Of the training."""
+
+    @property
+    def work(self) -> int:
+        """What an episode takes, in control periods of the PD."""
+        return round(self.effort * self.settings.horizon)
 
 
 def learned() -> dict[Cell, str]:
@@ -126,10 +128,23 @@ def contenders(cell: Cell) -> list[Contender]:
     if cell.gain != 1.0:
         make = partial(PDController, kp=cell.gain * PAPER_KP, kd=cell.gain * PAPER_KD)
     if make is not None:
-        return [Contender(cell.settings(arguments), make, f"{cell.controller} x {cell.gain:g}")]
+        effort = EFFORT.get(cell.controller, 1.0)
+        return [Contender(cell.settings(arguments), make, f"{cell.controller} x {cell.gain:g}", effort)]
     name = learned()[cell]
     policies = [(seed, load_policy(SHIPPED / f"{name}_seed{seed}")) for seed in shipped_seeds(name)]
-    return [Contender(cell.settings({}), policy_maker(policy), policy.card.digest, seed) for seed, policy in policies]
+    return [
+        Contender(cell.settings({}), policy_maker(policy), policy.card.digest, seed=seed) for seed, policy in policies
+    ]
+
+
+def starts(cell: Cell) -> set[str]:
+    """The environment's starts that a cell's regimes have; each is one run."""
+    return {regime.start for regime in cell.regimes}
+
+
+def work(cell: Cell) -> int:
+    """What a cell takes, in control periods of the PD."""
+    return len(starts(cell)) * sum(player.work for player in contenders(cell))
 
 
 def _lqr(cell: Cell) -> Contender:
@@ -138,7 +153,8 @@ def _lqr(cell: Cell) -> Contender:
     def follow(env: ElbowArmVectorEnv) -> TimeVaryingLQR:
         return TimeVaryingLQR(env, Trajectory.load(paths[env.settings.start]))
 
-    return Contender(cell.settings({}), follow, _digest([path.read_bytes() for path in paths.values()]))
+    identity = _digest([path.read_bytes() for path in paths.values()])
+    return Contender(cell.settings({}), follow, identity, EFFORT["lqr"])
 
 
 def _digest(contents: Sequence[bytes]) -> str:

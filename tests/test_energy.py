@@ -58,7 +58,7 @@ def measured(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(energy, "cells", lambda: QUICK)
         patch.setattr(energy, "sweep", list)
-        rows = energy.energy(folder, episodes=2, folder=folder / "cache")
+        rows = energy.energy(folder, episodes=2, folder=folder / "cache", parallel=False)
     return folder, rows
 
 
@@ -83,29 +83,45 @@ def test_benchmark_writes_tables_figures_and_context(measured):
         }
 
 
+def rows_of(cell, folder, seeds=(20_000, 20_001), fresh=False, tell=lambda _: None):
+    return energy.rows_of(cell, energy.play(cell, seeds, folder, fresh, tell))
+
+
 def test_interrupted_benchmark_goes_on(measured, monkeypatch):
     folder, rows = measured
-    cache_folder = folder / "cache"
-    again = energy.rows_of(QUICK[0], [20_000, 20_001], cache_folder)
-    assert again == rows[:3]
+    cached = folder / "cache"
     monkeypatch.setattr(energy, "in_all_regimes", lambda *_, **__: pytest.fail("measured again"))
-    assert energy.rows_of(QUICK[0], [20_000, 20_001], cache_folder) == rows[:3]
+    assert rows_of(QUICK[0], cached) == rows[:3]
     for change in ({"seeds": [20_000, 20_002]}, {"fresh": True}):
         with pytest.raises(pytest.fail.Exception, match="measured again"):
-            energy.rows_of(**{"cell": QUICK[0], "seeds": [20_000, 20_001], "folder": cache_folder, **change})
+            rows_of(QUICK[0], cached, **change)
     monkeypatch.setattr(cache, "code", lambda: "other code")
     with pytest.raises(pytest.fail.Exception, match="measured again"):
-        energy.rows_of(QUICK[0], [20_000, 20_001], cache_folder)
+        rows_of(QUICK[0], cached)
+
+
+def test_progress_tells_all_of_the_work_once(measured, tmp_path):
+    for folder in (tmp_path, measured[0] / "cache"):
+        told = []
+        rows_of(QUICK[0], folder, tell=told.append)
+        assert sum(told) == lineup.work(QUICK[0])
+
+
+def test_cells_in_processes_are_those_played_here(measured, monkeypatch):
+    folder, rows = measured
+    monkeypatch.setattr(energy, "cells", lambda: QUICK[:1])
+    monkeypatch.setattr(energy, "sweep", list)
+    assert energy.measure([20_000, 20_001], lambda _: None, folder / "other") == rows[:3]
 
 
 def test_gap_is_the_excess_over_the_bound_where_there_is_one(measured, monkeypatch):
-    folder, _ = measured
+    cached = measured[0] / "cache"
     monkeypatch.setattr(energy, "cached_bound", lambda _: {"closed_loop": 20.0})
-    whole, late, on_target = energy.rows_of(QUICK[0], [20_000, 20_001], folder / "cache")
+    whole, late, on_target = rows_of(QUICK[0], cached)
     assert whole.gap == pytest.approx(-whole.figures["return"].value / 20.0 - 1.0)
     assert on_target.gap is not None
     assert late.gap is None
-    assert all(row.gap is None for row in energy.rows_of(QUICK[1], [20_000, 20_001], folder / "cache"))
+    assert all(row.gap is None for row in rows_of(QUICK[1], cached))
 
 
 def test_lineup_finds_what_is_shipped(monkeypatch):
