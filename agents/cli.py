@@ -5,10 +5,12 @@ from __future__ import annotations
 import sys
 from typing import Any
 
+from gymnasium.error import DependencyNotInstalled
+
 
 def run(app: Any, prog: str, description: str | None) -> None:
-    """Runs a tyro app; a wrong argument ends with one line that says what is wrong."""
+    """Runs a tyro app; a wrong argument or a missing extra ends with one line that says what is wrong."""
     try:
         app.cli(prog=prog, description=description)
-    except ValueError as error:
+    except (ValueError, DependencyNotInstalled) as error:
         sys.exit(f"error: {error}")

@@ -65,15 +65,19 @@ def _write_mp4(path: Path, frames: Iterable[Pixels], frames_per_second: float, h
     from imageio_ffmpeg import write_frames
 
     writer: Any = None
-    for frame in _held(frames, round(hold * frames_per_second)):
-        # The usual kind of MP4 has sides of whole pairs of pixels.
-        even = np.ascontiguousarray(frame[: frame.shape[0] // 2 * 2, : frame.shape[1] // 2 * 2])
-        if writer is None:
-            size = (even.shape[1], even.shape[0])
-            writer = write_frames(str(path), size, fps=frames_per_second, quality=8, macro_block_size=2)
-            writer.send(None)
-        writer.send(even)
-    writer.close()
+    try:
+        for frame in _held(frames, round(hold * frames_per_second)):
+            # The usual kind of MP4 has sides of whole pairs of pixels.
+            even = np.ascontiguousarray(frame[: frame.shape[0] // 2 * 2, : frame.shape[1] // 2 * 2])
+            if writer is None:
+                size = (even.shape[1], even.shape[0])
+                writer = write_frames(str(path), size, fps=frames_per_second, quality=8, macro_block_size=2)
+                writer.send(None)
+            writer.send(even)
+    finally:
+        # Otherwise ffmpeg goes on writing the file of an interrupted video.
+        if writer is not None:
+            writer.close()
 
 
 def _held(frames: Iterable[Pixels], count: int) -> Iterator[Pixels]:

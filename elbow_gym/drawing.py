@@ -48,8 +48,8 @@ def mix(first: Colour, second: Colour, share: float) -> Colour:
 @lru_cache(64)
 def tones_of(colour: Colour) -> tuple[Colour, ...]:
     """The colour from its dark rim to its highlight, one for each of `SHARES`."""
-    dark, light = mix(colour, INK, 0.38), mix(colour, (255, 255, 255), 0.47)
-    return tuple(mix(dark, light, float(share)) for share in SHARES)
+    dark, light = mix(colour, INK, 0.4), mix(colour, (255, 255, 255), 0.55)
+    return tuple(mix(dark, colour, 2.0 * s) if s < 0.5 else mix(colour, light, 2.0 * s - 1.0) for s in SHARES.tolist())
 
 
 class Painter:
@@ -138,7 +138,7 @@ class Painter:
     def line(self, world: Array, colour: Colour, thickness: float, closed: bool = False) -> None:
         """A line through points [m], (m, 3), some pixels thick."""
         if len(world) > 1:
-            self._pygame.draw.lines(self.surface, colour, closed, self._points(world), max(1, round(thickness)))
+            self._pygame.draw.lines(self.surface, colour, closed, self._points(world), max(2, round(thickness)))
 
     def ring(self, centre: Array, radius: float, colour: Colour, thickness: float) -> None:
         """A circle on the table around a point."""

@@ -61,6 +61,13 @@ class Instruments:
         width, height = fine.get_size()
         return pygame.transform.smoothscale(fine, (max(1, width // FINER), max(1, height // FINER)))
 
+    def _panel(self, surface: Any, top: float, height: float) -> None:
+        # What lies under words shines through only faintly.
+        panel = self._pygame.Surface((self._width, round(height)))
+        panel.fill((255, 255, 255))
+        panel.set_alpha(170)
+        surface.blit(panel, (0, round(top)))
+
     def text(
         self, surface: Any, words: str, at: tuple[float, float], size: float, colour: Colour = INK, align: float = 0.0
     ) -> float:
@@ -80,6 +87,7 @@ class Instruments:
     def figures(self, surface: Any, entries: Sequence[tuple[str, str, str]]) -> None:
         """A row of (name, value, unit) across the top."""
         unit, width = self.unit, self._width / self.unit
+        self._panel(surface, 0.0, 60.0 * unit)
         step = min((width - 28.0) / len(entries), 170.0)
         for k, (name, value, symbol) in enumerate(entries):
             left = (16.0 + k * step) * unit
@@ -102,6 +110,7 @@ class Instruments:
         draw, unit = self._pygame.draw, self.unit
         left, right = 52.0 * unit, self._width - 16.0 * unit
         top, bottom = self._height - 98.0 * unit, self._height - 20.0 * unit
+        self._panel(surface, top - 28.0 * unit, self._height - (top - 28.0 * unit))
         lowest = bar_height(LEAST_POWER)
         rise = (bottom - top) / (1.0 - lowest)
         zero = round(bottom + rise * lowest)

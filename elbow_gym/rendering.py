@@ -145,7 +145,7 @@ class Renderer:
                 size, colour = 1.5 * radii[k], ELBOW
             elif k == last:
                 # Its volume grows with the mass.
-                size = radii[k] + 0.0093 * self._stage.reach * (scene.payload / 0.1) ** (1.0 / 3.0)
+                size += 0.0093 * self._stage.reach * (scene.payload / 0.1) ** (1.0 / 3.0)
                 colour = self._accent
             # Before both of its links, whichever way they lean.
             middles = (scene.joints[k - 1 : k + 2] + scene.joints[k]) / 2.0
@@ -175,7 +175,7 @@ class Renderer:
             [
                 ("time", f"{scene.time:.2f}", "s"),
                 ("error", f"{1e3 * scene.error:.1f}", "mm"),
-                ("energy", f"{scene.energy:.4g}" if abs(scene.energy) < 1e4 else f"{scene.energy:.0f}", "J"),
+                ("energy", f"{scene.energy:.1f}", "J"),
                 ("power", f"{scene.power.sum():.1f}", "W"),
                 ("support", *scene.support),
             ],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -53,14 +53,16 @@ def display_driver() -> str | None:
 class Window:
     """A window that opens with its first picture. Once the user has closed it, it stays closed.
 
+    pygame has one display: another window's next picture takes it over.
+
     Args:
         title: what its bar says.
     """
 
+    _shown: ClassVar[Window | None] = None
+
     def __init__(self, title: str) -> None:
         self._title = title
-        self._surface: Any = None
-        self._clock: Any = None
         self.closed = False
         """Whether the user has closed it."""
 
@@ -69,21 +71,22 @@ class Window:
         if self.closed:
             return
         pygame = load_pygame()
-        if self._surface is None or not pygame.display.get_init():
+        if Window._shown is not self or not pygame.display.get_init():
             pygame.display.init()
             pygame.display.set_caption(self._title)
-            self._surface = pygame.display.set_mode(pixels.shape[1::-1])
-            self._clock = pygame.time.Clock()
-        pygame.surfarray.blit_array(self._surface, pixels.swapaxes(0, 1))
+            pygame.display.set_mode(pixels.shape[1::-1])
+            Window._shown, self._clock = self, pygame.time.Clock()
+        pygame.surfarray.blit_array(pygame.display.get_surface(), pixels.swapaxes(0, 1))
         pygame.display.flip()
         self._clock.tick(frames_per_second)
         if pygame.event.get(pygame.QUIT):
             self.close()
             self.closed = True
+            return
         pygame.event.clear()
 
     def close(self) -> None:
         """Takes the window away. May be called twice."""
-        if self._surface is not None:
+        if Window._shown is self:
             load_pygame().display.quit()
-            self._surface = None
+            Window._shown = None

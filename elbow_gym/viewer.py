@@ -196,7 +196,7 @@ def stage_of(episodes: Episodes) -> Stage:
     if episodes.settings.start == "paper":
         turn = math.remainder(goal - float(episodes.pose[0]), 2.0 * math.pi)
     points = [path, np.zeros((1, 3))]
-    for azimuth in np.linspace(goal - turn, goal, 9):
+    for azimuth in np.linspace(goal - 1.25 * turn, goal, 9):
         for height in (0.0, 0.1 * reach):
             radius = np.hypot(start[:, 0], start[:, 1])
             around = np.stack([radius * math.cos(azimuth), radius * math.sin(azimuth), start[:, 2] + height], axis=-1)
@@ -204,7 +204,7 @@ def stage_of(episodes: Episodes) -> Stage:
     return Stage(
         reach=reach,
         weight=max(1.0, arm.gravity * float(arm.of_links("mass").sum())),
-        radius=min(0.013 * reach, 0.3 * float(np.median(length[length > 0.0]))),
+        radius=min(0.015 * reach, 0.45 * float(np.median(length[length > 0.0]))),
         seen=np.concatenate(points),
         azimuth=goal + math.copysign(math.radians(100.0), -turn if turn else -1.0),
     )

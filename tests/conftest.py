@@ -1,4 +1,6 @@
-"""What all tests share: a deterministic hypothesis profile and the paper's arm."""
+"""What all tests share: a deterministic hypothesis profile, windows that nobody sees, and the paper's arm."""
+
+import os
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -14,6 +16,7 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("elbow_gym")
+os.environ["SDL_VIDEODRIVER"] = "dummy"
 
 
 @pytest.fixture(scope="session")

@@ -1,14 +1,15 @@
-"""Makes the golden traces: `python tests/make_golden.py`.
+"""Makes the golden traces and the golden picture: `python tests/make_golden.py`.
 
 The one script that writes tests/golden/. A trace that changes is a change of the physics as users see it and
-needs a line in CHANGELOG.md that says why.
+needs a line in CHANGELOG.md that says why; so does a picture that looks different.
 """
 
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
-from elbow_gym import Simulator
+from elbow_gym import ElbowArmEnv, Simulator
 
 GOLDEN = Path(__file__).parent / "golden"
 ELBOWS = (0, 1, 2)
@@ -26,11 +27,21 @@ def trace(elbows):
     return {"voltage": voltages} | {name: np.stack([moment[name] for moment in moments]) for name in moments[0]}
 
 
+def picture():
+    """What a small picture shows of the paper's arm after 0.4 s of seeded voltages."""
+    env = ElbowArmEnv(render_mode="rgb_array", render_width=320, render_height=240)
+    env.reset(seed=5)
+    for action in np.random.default_rng(5).uniform(-0.3, 0.3, (20, 10)):
+        env.step(action)
+    return env.render()
+
+
 def main():
     GOLDEN.mkdir(exist_ok=True)
     for elbows in ELBOWS:
         np.savez_compressed(GOLDEN / f"elbows_{elbows}.npz", **trace(elbows))
-    print(f"Wrote {len(ELBOWS)} traces to {GOLDEN}. If one changed, say why in CHANGELOG.md.")
+    Image.fromarray(picture()).save(GOLDEN / "picture.png", optimize=True)
+    print(f"Wrote {len(ELBOWS)} traces and a picture to {GOLDEN}. If one changed, say why in CHANGELOG.md.")
 
 
 if __name__ == "__main__":
