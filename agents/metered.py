@@ -29,7 +29,7 @@ class MeteredVectorEnv(ElbowArmVectorEnv):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """As `ElbowArmVectorEnv.reset`; when `staggered`, an arm's first episode is the shorter the higher its number."""
+        """As `ElbowArmVectorEnv.reset`; when `staggered`, arms of higher number have a shorter first episode."""
         observation, info = super().reset(seed=seed, options=options)
         if self.staggered:
             state = self.get_state()
