@@ -322,16 +322,41 @@ def test_a_point_of_the_front_puts_its_run_into_the_replay(opened):
     wait(opened, "return document.getElementById('name-a').textContent.startsWith('A: PD')")
 
 
-def test_the_view_and_playing_obey_the_keyboard(opened):
+def test_the_arrow_keys_turn_the_view(opened):
     picture = "return document.getElementById('scene').toDataURL()"
     before = opened.execute_script(picture)
     press(opened, "#scene", "\ue012", "\ue012")  # left
     assert opened.execute_script(picture) != before
-    emulate(opened, prefers_reduced_motion="reduce")
-    press(opened, "#play", "\ue00d")
-    wait(opened, "return Number(document.getElementById('time').value) > 2")
+    press(opened, "#scene", "\ue014", "\ue014")  # right, back again
+    assert opened.execute_script(picture) == before
+
+
+def test_playing_moves_the_time_until_it_is_stopped(opened):
+    press(opened, "#play", "\ue00d")  # Space
+    assert text(opened, "#play") == "Pause"
+    wait(opened, "return Number(document.getElementById('time').value) > 2.1")
     press(opened, "#play", "\ue00d")
     assert text(opened, "#play") == "Play"
+    stopped = "return document.getElementById('time').value"
+    before = opened.execute_script(stopped)
+    opened.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
+    assert opened.execute_script(stopped) == before
+
+
+def test_with_reduced_motion_playing_goes_in_steps(opened):
+    emulate(opened, prefers_reduced_motion="reduce")
+    opened.execute_script(
+        "window.seen = [2];"
+        "const keep = () => window.seen.push(Number(document.getElementById('time').value));"
+        "new MutationObserver(keep).observe(document.getElementById('clock'), {childList: true});"
+    )
+    press(opened, "#play", "\ue00d")
+    wait(opened, "return window.seen.length > 3")
+    press(opened, "#play", "\ue00d")
+    steps = np.diff(list(dict.fromkeys(opened.execute_script("return window.seen"))))
+    # Of half a second; the first frame only starts the clock.
+    assert steps.size > 1
+    assert (steps[1:] > 0.4).all()
 
 
 def test_every_control_has_a_name_for_a_screen_reader(opened):

@@ -23,7 +23,9 @@ def report(output: Path, results: Path = RESULTS) -> Path:
 
     entries = roster(results)
     layout = "{desc} {percentage:3.0f}%|{bar}| {elapsed} elapsed, {remaining} left"
-    with tqdm(total=sum(entry.size for entry in entries), desc="playing", bar_format=layout, file=sys.stderr) as bar:
+    total = sum(entry.size for entry in entries)
+    # Work is told of in bursts: the time left follows the mean speed.
+    with tqdm(total=total, desc="playing", bar_format=layout, smoothing=0.0, file=sys.stderr) as bar:
         runs = collect(entries, bar.update)
         bar.set_description("writing")
     write_text(output, page(runs, results))
