@@ -143,6 +143,29 @@ def test_trace_is_where_the_hand_was_since_the_reset():
         np.testing.assert_allclose(scene.trace[-1], hands[-1], atol=1e-12)
 
 
+def test_drawn_arm_is_seen_with_its_own_lengths():
+    env = ElbowArmEnv(elbows=0, randomize={"length": [0.85, 0.95]})
+    env.reset(seed=1)
+    seen = Viewer(env.episodes, "rgb_array")
+    seen.restart()
+    np.testing.assert_allclose(seen.scene().joints[-1], env.episodes.simulator.hand_position[0], atol=1e-12)
+
+
+def test_friction_of_the_table_is_seen_along_and_across_the_arms_radius():
+    env = ElbowArmEnv(elbows=0, table={"friction": 0.5})
+    env.reset(seed=1)
+    seen = Viewer(env.episodes, "rgb_array")
+    seen.restart()
+    for _ in range(20):
+        env.step(np.eye(10)[0])
+    yaw, force = env.episodes.simulator.q[0, 0], env.episodes.simulator.contact_force[0]
+    out = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    across = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+    assert abs(yaw) > 0.1
+    assert np.abs(force[:, 1]).max() > 0.1
+    np.testing.assert_allclose(seen.scene().forces @ np.stack([out, across, np.eye(3)[2]]).T, force, atol=1e-12)
+
+
 def test_power_is_the_mean_of_the_last_tenth_of_a_second():
     env = ElbowArmEnv(**SMALL)
     env.reset(seed=1)
