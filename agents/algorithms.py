@@ -116,9 +116,9 @@ class PPOSettings(AlgorithmSettings):
     """Proximal policy optimisation, chosen for this arm."""
 
     total_timesteps: int = 1_500_000
-    num_envs: int = 32
+    num_envs: int = 64
     learning_rate: float = 5e-4
-    n_steps: int = 128
+    n_steps: int = 64
     """Control periods per arm and update."""
     batch_size: int = 1024
     """Samples per gradient step."""
@@ -166,13 +166,15 @@ class SACSettings(AlgorithmSettings):
     controller that works or from a narrow actor.
     """
 
-    total_timesteps: int = 300_000
-    num_envs: int = 16
-    learning_rate: float = 1e-3
+    total_timesteps: int = 70_000
+    num_envs: int = 32
+    learning_rate: float = 7e-4
     gamma: float = 0.95
     activation: Activation = "relu"
-    evaluate_every: int = 10_000
-    buffer_size: int = 300_000
+    evaluate_every: int = 5_000
+    hidden: tuple[int, ...] = (64, 64)
+    critic_hidden: tuple[int, ...] | None = (128, 128)
+    buffer_size: int = 200_000
     """Control periods remembered, of all arms together."""
     batch_size: int = 256
     """Samples per gradient step."""
@@ -258,17 +260,20 @@ class CloneSettings:
 ALGORITHMS: dict[str, type[AlgorithmSettings]] = {"ppo": PPOSettings, "sac": SACSettings}
 
 _PPO, _SAC = PPOSettings(), SACSettings()
+_QUICK = replace(
+    _PPO, num_envs=128, n_steps=32, n_epochs=6, gamma=0.98, learning_rate=7e-4, hidden=(64, 64), activation="silu"
+)
 DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
     ("ppo", "elbows2"): _PPO,
-    ("ppo", "elbows1"): replace(_PPO, total_timesteps=3_000_000),
-    ("ppo", "elbows0"): replace(_PPO, total_timesteps=5_000_000),
-    ("ppo", "table"): replace(_PPO, total_timesteps=3_000_000),
-    ("ppo", "random"): replace(_PPO, total_timesteps=5_000_000),
+    ("ppo", "elbows1"): replace(_PPO, gamma=0.98),
+    ("ppo", "elbows0"): replace(_PPO, gamma=0.98, total_timesteps=2_000_000),
+    ("ppo", "table"): replace(_QUICK, total_timesteps=1_000_000),
+    ("ppo", "random"): replace(_QUICK, total_timesteps=2_000_000),
     ("sac", "elbows2"): _SAC,
-    ("sac", "elbows1"): replace(_SAC, total_timesteps=500_000),
-    ("sac", "elbows0"): replace(_SAC, total_timesteps=500_000),
-    ("sac", "table"): replace(_SAC, total_timesteps=500_000),
-    ("sac", "random"): replace(_SAC, total_timesteps=1_000_000),
+    ("sac", "elbows1"): _SAC,
+    ("sac", "elbows0"): _SAC,
+    ("sac", "table"): _SAC,
+    ("sac", "random"): replace(_SAC, total_timesteps=200_000),
 }
 """Settings by algorithm and task."""
 
