@@ -72,6 +72,7 @@ def joints(rows: Sequence[Row], path: Path) -> None:
             # A joint can give energy back; between -1 and 1 J the axis is linear.
             ax.set_yscale("symlog", linthresh=1.0)
             ax.grid(axis="x", visible=False)
+            ax.set_axisbelow(True)
             ax.axhline(0.0, color="black", lw=0.6)
             if line == 0:
                 ax.set_title(ELBOW_NAMES[elbows])

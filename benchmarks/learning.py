@@ -133,6 +133,8 @@ def figure(curves: Sequence[Curve], results: Path, path: Path) -> None:
     fig, axes = plt.subplots(
         len(tasks), len(AXES), figsize=(9, 1.2 + 2.4 * len(tasks)), squeeze=False, sharey="row", layout="constrained"
     )
+    from matplotlib.ticker import EngFormatter
+
     papers = _pd_rows(results)
     for line, task in enumerate(tasks):
         for ax, (against, label) in zip(axes[line], AXES.items(), strict=True):
@@ -145,6 +147,7 @@ def figure(curves: Sequence[Curve], results: Path, path: Path) -> None:
             _mark(ax, task, papers)
             ax.set_yscale("log")
             ax.set_xlim(left=0.0)
+            ax.xaxis.set_major_formatter(EngFormatter(sep=""))
             ax.set_title(TASKS[task])
             if line == len(tasks) - 1:
                 ax.set_xlabel(label)
