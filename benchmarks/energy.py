@@ -149,8 +149,9 @@ def measure(
 def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path) -> None:
     """Writes the tables, the figures and what made them, each file whole.
 
-    energy.csv and .md (nominal part), energy_shifted.*, energy_table.*, energy_seeds.csv, energy.json; energy.png,
-    energy_joints.png, pareto.png, pareto_gains.csv; breakdown.* of the paper's PD; learning.* where curves are there.
+    energy.csv and .md (nominal part), energy_brief.md of it, energy_shifted.*, energy_table.*, energy_seeds.csv,
+    energy.json; energy.png, energy_joints.png, pareto.png, pareto_gains.csv; breakdown.* of the paper's PD; learning.*
+    where curves are there.
     """
     played = [row for row in rows if row.gain == 1.0]
     for part in PARTS:
@@ -159,6 +160,8 @@ def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path
         if chosen:
             energy_table.write_rows(chosen, folder / f"{stem}.csv")
             write_text(folder / f"{stem}.md", energy_table.markdown(chosen))
+    nominal = [row for row in played if row.part == "nominal"]
+    write_text(folder / "energy_brief.md", energy_table.brief(nominal))
     energy_table.write_seeds(played, folder / "energy_seeds.csv")
     context = {
         "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
@@ -170,7 +173,6 @@ def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path
         "versions": versions(*PACKAGES),
     }
     write_text(folder / "energy.json", json.dumps(context, indent=2) + "\n")
-    nominal = [row for row in played if row.part == "nominal"]
     write_whole(folder / "energy.png", lambda temporary: energy_figure.figure(nominal, temporary))
     write_whole(folder / "energy_joints.png", lambda temporary: energy_figure.joints(nominal, temporary))
     marks = pareto.marks([row for row in rows if row.part == "nominal"])

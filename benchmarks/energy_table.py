@@ -30,6 +30,19 @@ HEADER = (
 )
 
 
+BRIEF_HEADER = (
+    "elbows",
+    "controller",
+    "return, A",
+    "gap, A",
+    "energy, A (J)",
+    "energy, B (J)",
+    "rms, B (mm)",
+    "energy, C (J)",
+    "seeds",
+)
+
+
 def shown(row: Row, estimate: Callable[[Estimate], str]) -> tuple[str, ...]:
     """A row's cells under HEADER; `estimate` writes the figures that have an interval."""
     figures = row.figures
@@ -51,11 +64,47 @@ def shown(row: Row, estimate: Callable[[Estimate], str]) -> tuple[str, ...]:
     )
 
 
+def with_interval(estimate: Estimate) -> str:
+    """A figure with its 95 % interval."""
+    return f"{estimate.value:.4g} [{estimate.low:.4g}, {estimate.high:.4g}]"
+
+
 def markdown(rows: Sequence[Row]) -> str:
-    """The README's table, with 95 % intervals."""
-    lines = [HEADER, ("---",) * len(HEADER)]
-    lines += [shown(row, lambda e: f"{e.value:.4g} [{e.low:.4g}, {e.high:.4g}]") for row in rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    """Every row, with 95 % intervals."""
+    return _pipes([HEADER, *(shown(row, with_interval) for row in rows)])
+
+
+def brief(rows: Sequence[Row]) -> str:
+    """The README's table: a line per elbow count and controller, the regimes side by side, the best return first."""
+    regimes: dict[tuple[int, str], dict[str, Row]] = {}
+    for row in rows:
+        regimes.setdefault((row.elbows, row.controller), {})[row.regime] = row
+
+    def merit(key: tuple[int, str]) -> tuple[int, float]:
+        return -key[0], -regimes[key]["A"].figures["return"].value
+
+    lines: list[tuple[str, ...]] = [BRIEF_HEADER]
+    for key in sorted(regimes, key=merit):
+        whole, steady, on_target = (regimes[key][name] for name in "ABC")
+        lines.append(
+            (
+                str(key[0]),
+                CONTROLLER_NAMES.get(key[1], key[1]),
+                with_interval(whole.figures["return"]),
+                "" if whole.gap is None else f"{100.0 * whole.gap:.3g} %",
+                with_interval(whole.figures["electrical_energy"]),
+                f"{steady.figures['electrical_energy'].value:.4g}",
+                with_interval(steady.figures["error_rms"]),
+                f"{on_target.figures['electrical_energy'].value:.4g}",
+                str(len(whole.seeds)) if whole.seeds else "-",
+            )
+        )
+    return _pipes(lines)
+
+
+def _pipes(lines: Sequence[tuple[str, ...]]) -> str:
+    rule = ("---",) * len(lines[0])
+    return "".join(f"| {' | '.join(line)} |\n" for line in (lines[0], rule, *lines[1:]))
 
 
 def table(rows: Sequence[Row], title: str) -> Any:

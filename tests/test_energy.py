@@ -68,7 +68,15 @@ def test_benchmark_writes_tables_figures_and_context(measured):
     assert [row.part for row in rows] == ["nominal"] * 3 + ["shifted"] * 2 + ["table"] * 3
     stems = ("energy", "energy_shifted", "energy_table")
     expected = {f"{stem}.{suffix}" for stem in stems for suffix in ("csv", "md")}
-    expected |= {"energy.json", "energy.png", "energy_joints.png", "energy_seeds.csv", "pareto.png", "pareto_gains.csv"}
+    expected |= {
+        "energy_brief.md",
+        "energy.json",
+        "energy.png",
+        "energy_joints.png",
+        "energy_seeds.csv",
+        "pareto.png",
+        "pareto_gains.csv",
+    }
     assert {path.name for path in folder.iterdir()} == expected | {"cache"}
     with (folder / "energy.csv").open() as handle:
         written = list(csv.DictReader(handle))
@@ -191,6 +199,23 @@ def test_committed_table_is_made_of_the_committed_figures():
         assert float(cells[3].split()[0]) == pytest.approx(value, rel=1e-3)
         assert float(cells[5].split()[0]) == pytest.approx(float(row["error_rms [mm]"]), rel=1e-3)
     assert set(UNITS) <= {name.split(" ")[0] for name in committed()[0]}
+
+
+def test_committed_brief_table_puts_the_regimes_of_the_committed_figures_side_by_side():
+    by_key = {(row["elbows"], CONTROLLER_NAMES[row["controller"]], row["regime"]): row for row in committed()}
+    lines = [line.strip("| ").split(" | ") for line in (RESULTS / "energy_brief.md").read_text().splitlines()[2:]]
+    assert 3 * len(lines) == len(by_key)
+    for elbows, name, gain, _, whole, steady, error, on_target, _ in lines:
+        for cell, regime, column in (
+            (gain, "A", "return [-]"),
+            (whole, "A", "electrical_energy [J]"),
+            (steady, "B", "electrical_energy [J]"),
+            (error, "B", "error_rms [mm]"),
+            (on_target, "C", "electrical_energy [J]"),
+        ):
+            assert float(cell.split()[0]) == pytest.approx(float(by_key[elbows, name, regime][column]), rel=1e-3)
+    order = [(int(line[0]), float(line[2].split()[0])) for line in lines]
+    assert order == sorted(order, reverse=True)
 
 
 def test_shifted_set_asks_for_what_the_nominal_one_does_not_have():

@@ -141,7 +141,7 @@ def test_every_shipped_policy_loads_fits_and_is_small():
         policy = load_policy(policies.SHIPPED / name)
         policy.check(ElbowArmEnv(**policy.card.environment))
         assert sum(path.stat().st_size for path in policies.pair(policies.SHIPPED / name)) < 300_000
-        assert policy.card.command.startswith("python -m agents train")
+        assert policy.card.command.startswith(("python -m agents train", "python -m agents clone"))
         task = task_name(policy.card.env, policy.card.environment["elbows"])
         assert name.startswith(policy.card.algorithm)
         assert name.endswith(f"{task}_seed{policy.card.training['seed']}")

@@ -24,13 +24,19 @@ def test_readme_snippet_runs(snippet):
 
 def test_energy_table_is_the_committed_one():
     table = README.split("<!-- energy -->\n")[1].split("<!-- /energy -->")[0]
-    assert table == (ROOT / "benchmarks/results/energy.md").read_text(encoding="utf-8")
+    assert table == (ROOT / "benchmarks/results/energy_brief.md").read_text(encoding="utf-8")
 
 
 def test_breakdown_in_the_benchmarks_readme_is_the_committed_one():
     page = (ROOT / "benchmarks/README.md").read_text(encoding="utf-8")
     table = page.split("<!-- breakdown -->\n")[1].split("<!-- /breakdown -->")[0]
     assert table == (ROOT / "benchmarks/results/breakdown.md").read_text(encoding="utf-8")
+
+
+def test_learning_table_in_the_benchmarks_readme_is_the_committed_one():
+    page = (ROOT / "benchmarks/README.md").read_text(encoding="utf-8")
+    table = page.split("<!-- learning -->\n")[1].split("<!-- /learning -->")[0]
+    assert table == (ROOT / "benchmarks/results/learning.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("path", re.findall(r"!\[[^]]*\]\(([^)]+)\)|`((?:tests|benchmarks)/[\w./]+)`", README))
