@@ -266,7 +266,7 @@ _QUICK = replace(
 DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
     ("ppo", "elbows2"): _PPO,
     ("ppo", "elbows1"): replace(_PPO, gamma=0.98, total_timesteps=1_000_000),
-    ("ppo", "elbows0"): replace(_PPO, gamma=0.98, total_timesteps=1_000_000),
+    ("ppo", "elbows0"): replace(_QUICK, first_energy_share=0.1, total_timesteps=2_000_000),
     ("ppo", "table"): replace(_QUICK, total_timesteps=800_000),
     ("ppo", "random"): _QUICK,
     ("sac", "elbows2"): _SAC,
