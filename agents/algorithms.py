@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,7 +27,7 @@ class Falling:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AlgorithmSettings:
+class AlgorithmSettings(ABC):
     """What all algorithms have."""
 
     total_timesteps: int
@@ -74,10 +75,11 @@ class AlgorithmSettings:
         return {**arguments, **{name: value for name, value in own.items() if value is not None}}
 
     @property
+    @abstractmethod
     def model_class(self) -> Any:
         """Stable-Baselines3's class."""
-        raise NotImplementedError
 
+    @abstractmethod
     def model(self, env: Any, seed: int, log: Path) -> Any:
         """Stable-Baselines3's model on the CPU.
 
@@ -86,7 +88,6 @@ class AlgorithmSettings:
             seed: of the networks and the sampling.
             log: folder for TensorBoard.
         """
-        raise NotImplementedError
 
     def _common(self, env: Any, seed: int, log: Path, critic: str) -> dict[str, Any]:
         import torch

@@ -6,6 +6,7 @@ since the start by their own calls: make one controller per episode, and let all
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -88,7 +89,7 @@ class Reference:
         )
 
 
-class _Following:
+class _Following(ABC):
     """What the controllers below share: they see the state, follow a reference and give clipped actions."""
 
     def __init__(self, env: Env, pose: ArrayLike | None = None, reach_time: float = REACH_TIME) -> None:
@@ -109,8 +110,8 @@ class _Following:
         voltage = self._voltage(wanted, q, seen["joint_velocity"], seen["current"])
         return np.clip(voltage / self._volts, -self._highest, self._highest).astype(np.float32), None
 
-    def _voltage(self, wanted: Motion, q: Array, q_dot: Array, current: Array) -> Array:
-        raise NotImplementedError
+    @abstractmethod
+    def _voltage(self, wanted: Motion, q: Array, q_dot: Array, current: Array) -> Array: ...
 
 
 class SmoothPD(_Following):

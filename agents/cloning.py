@@ -148,7 +148,7 @@ def _clone_one(
     """One seed in a process of its own."""
     import torch
 
-    from agents.keeper import evaluation, evaluation_seeds, write_evaluations
+    from agents.keeper import evaluation, evaluation_row, evaluation_seeds, write_evaluations
     from agents.run import machine, versions
 
     torch.set_num_threads(1)
@@ -163,7 +163,7 @@ def _clone_one(
         nonlocal spent, since
         spent += time.monotonic() - since
         figures = evaluation(policy, settings)
-        rows.append([float(steps), spent, time.monotonic() - started, *figures.values()])
+        rows.append(evaluation_row(steps, spent, time.monotonic() - started, figures))
         write_evaluations(folder, rows)
         if not best or figures["return"] > best[0].card.evaluation["return"]:
             policy.card.training.update(timesteps=steps, seconds=round(spent, 1))

@@ -158,8 +158,7 @@ class Keeper(BaseCallback):
         figures = evaluation(policy, self._settings)
         for name, value in figures.items():
             model.logger.record(f"evaluation/{name}", value)
-        row = {"steps": model.num_timesteps, "training_seconds": self._training, "wall_seconds": self._wall, **figures}
-        self._rows.append([float(row[name]) for name in COLUMNS])
+        self._rows.append(evaluation_row(model.num_timesteps, self._training, self._wall, figures))
         write_evaluations(self._run.folder, self._rows)
         if self._best is None or figures["return"] > self._best.card.evaluation["return"]:
             policy.card.evaluation.update(figures, seeds=list(evaluation_seeds(self._settings)))
@@ -198,6 +197,12 @@ def evaluation(policy: Policy, settings: Settings) -> dict[str, float]:
         "steady_error_rms_mm": float(np.sqrt((steady["error_rms"] ** 2).mean())),
         "error_mean_mm": float(whole["error_mean"].mean()),
     }
+
+
+def evaluation_row(steps: int, training: float, wall: float, figures: Mapping[str, float]) -> list[float]:
+    """A row of evaluations.csv in the order of `COLUMNS`, from control periods, both kinds of seconds and figures."""
+    row = {"steps": steps, "training_seconds": training, "wall_seconds": wall, **figures}
+    return [float(row[name]) for name in COLUMNS]
 
 
 def sentence(figures: Mapping[str, float]) -> str:

@@ -31,7 +31,7 @@ class MeteredVectorEnv(ElbowArmVectorEnv):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """As `ElbowArmVectorEnv.reset`; when `staggered`, arms of higher number have a shorter first episode."""
         observation, info = super().reset(seed=seed, options=options)
-        if self.staggered:
+        if self.staggered and "reset_mask" not in (options or {}):
             state = self.get_state()
             state["episodes"]["steps"] = np.arange(self.num_envs) * self.settings.horizon // self.num_envs
             self.set_state(state)

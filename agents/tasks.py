@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,6 +11,8 @@ from elbow_gym.settings import Settings
 
 ENVIRONMENTS = {"ElbowArm-v0": "elbows", "ElbowArmTable-v0": "table", "ElbowArmRandom-v0": "random"}
 """Ids of the environments and what a task in them is called; the elbow count follows "elbows"."""
+POLICY_NAME = re.compile(r"(?P<controller>[a-z]+(_[a-z]+)??)_(?P<task>elbows\d+|table|random)")
+"""What files of policies and curves are called before "_seedK": ALGORITHM[_LABEL]_TASK."""
 
 
 def registered_arguments(env: str) -> dict[str, Any]:

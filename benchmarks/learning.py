@@ -14,7 +14,7 @@ from scipy import stats
 
 from agents.files import write_csv, write_text, write_whole
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES, ELBOW_NAMES, pyplot
-from benchmarks.lineup import SHIPPED_NAME
+from agents.tasks import POLICY_NAME
 from benchmarks.optimal import RESULTS, Cell, cached
 
 Array = NDArray[np.float64]
@@ -57,7 +57,7 @@ def load(folder: Path) -> list[Curve]:
     curves = []
     for path in sorted(folder.glob("*_seed*.csv")):
         name, _, seed = path.stem.rpartition("_seed")
-        parts = SHIPPED_NAME.fullmatch(name)
+        parts = POLICY_NAME.fullmatch(name)
         if parts is None or not seed.isdigit():
             raise ValueError(f"curves must be named ALGORITHM_TASK_seedK.csv, got {path.name}")
         with path.open(newline="", encoding="utf-8") as handle:

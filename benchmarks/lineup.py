@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,6 +13,7 @@ from agents.lqr import TimeVaryingLQR
 from agents.metrics import REGIMES, Regime
 from agents.pd import PAPER_KD, PAPER_KP, PDController
 from agents.policy import SHIPPED, load_policy, shipped_policies, shipped_seeds
+from agents.tasks import POLICY_NAME
 from agents.trajectory import Trajectory
 from benchmarks import optimal
 from elbow_gym.settings import Settings
@@ -30,7 +30,6 @@ GAINS = (0.25, 0.5, 2.0, 4.0)
 """By which both gains of the paper's PD are multiplied in the sweep beside it."""
 EFFORT = {"pd_smooth": 2.0, "pd_gravity": 2.5, "computed_torque": 3.0, "computed_torque_posture": 8.0, "lqr": 8.0}
 """Of a control period, times the PD's, for an honest time left; starting takes part of it."""
-SHIPPED_NAME = re.compile(r"(?P<controller>[a-z]+(_[a-z]+)??)_(?P<task>elbows\d+|table|random)")
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ def learned() -> dict[Cell, str]:
     """The learned cells, and the names of the policies that are shipped for them."""
     found: dict[Cell, str] = {}
     for name in sorted({policy.rpartition("_seed")[0] for policy in shipped_policies()}):
-        parts = SHIPPED_NAME.fullmatch(name)
+        parts = POLICY_NAME.fullmatch(name)
         if parts is None:
             continue
         controller, task = parts["controller"], parts["task"]

@@ -243,6 +243,11 @@ def test_staggered_arms_end_their_first_episodes_one_after_the_other():
         _, _, _, truncated, _ = env.step(np.zeros((5, 10), np.float32))
         ends += [(k, int(i)) for i in np.flatnonzero(truncated)]
     assert ends == [(5, 4), (10, 3), (15, 2), (20, 1), (25, 0)]
+    # Who resets some arms wants whole episodes, and the others left alone.
+    env.step(np.zeros((5, 10), np.float32))
+    before = env.get_state()["episodes"]["steps"]
+    env.reset(options={"reset_mask": np.array([True, False, False, False, False])})
+    assert env.get_state()["episodes"]["steps"].tolist() == [0, *before[1:]]
 
 
 def test_price_of_power_rises_until_half_of_the_training():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from agents.evaluate import CLASSICAL, named_controller
 from agents.figures import CASES
 from agents.lqr import TimeVaryingLQR
 from agents.policy import shipped_policies
+from agents.tasks import POLICY_NAME
 from agents.trajectory import Trajectory
 from elbow_gym.settings import STARTS, Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
@@ -20,7 +20,6 @@ SHOWN_AS = {"pd": "pd_24v"}
 """Names in the benchmark's tables where they differ from the command line's."""
 TABLE = "table"
 """Name of the compliant table where others have their number of elbows."""
-SHIPPED_NAME = re.compile(r"(?P<controller>\w+)_(?P<task>elbows(?P<elbows>\d+)|table|random)_seed\d+")
 # What one episode takes beside one of the paper's PD without a limit, for an honest time left.
 EFFORT = {
     "pd_paper": 1.0,
@@ -95,15 +94,16 @@ def roster(results: Path) -> list[Entry]:
         if all(trajectory(results, elbows, start).is_file() for start in STARTS)
     ]
     learned, tabletop = [], []
-    named = [found for policy in shipped_policies() if (found := SHIPPED_NAME.fullmatch(policy))]
     # Several seeds make one entry, which plays the best.
-    for name, task, elbows in {found.group("controller", "task", "elbows") for found in named}:
+    names = {policy.rpartition("_seed")[0] for policy in shipped_policies()}
+    for found in filter(None, map(POLICY_NAME.fullmatch, names)):
+        name, task = found.group("controller", "task")
         if task == "table":
             tabletop.append(Entry(name, 0, results, "ElbowArmTable-v0"))
         elif task == "random":
             learned.append(Entry(name, 2, results, "ElbowArmRandom-v0"))
         else:
-            learned.append(Entry(name, int(elbows), results))
+            learned.append(Entry(name, int(task.removeprefix("elbows")), results))
     entries += sorted(learned, key=lambda entry: (entry.controller, -entry.elbows))
     if tabletop:
         entries += [Entry(name, 0, results, "ElbowArmTable-v0") for name in CLASSICAL if name != "pd_paper"]
