@@ -55,8 +55,10 @@ class AlgorithmSettings(ABC):
     start: Start | None = None
     """Where episodes start while it trains; as in the environment when None."""
     first_energy_share: float = 1.0
-    """Share of the reward's energy weight that the training starts with. It rises linearly until half of the training
-    is done: noise on the voltages costs power, and a high price on it ends exploration too early."""
+    """Multiple of the reward's energy weight that the training starts with. Below one the noise on the voltages, which
+    costs power, does not end exploration too early; above one the cheap postures are found before the precise ones."""
+    energy_share_until: float = 0.5
+    """Share of the training after which the weight, changing linearly, is the reward's own."""
     evaluate_every: int = 50_000
     """Control periods between two evaluations."""
 
@@ -66,8 +68,13 @@ class AlgorithmSettings(ABC):
         return 1
 
     def energy_share(self, done: float) -> float:
-        """Share of the energy weight when this share of the training is done."""
-        return min(1.0, self.first_energy_share + (1.0 - self.first_energy_share) * done / 0.5)
+        """Multiple of the energy weight when this share of the training is done."""
+        return self.first_energy_share + (1.0 - self.first_energy_share) * min(1.0, done / self.energy_share_until)
+
+    def planned_log_std(self, done: float) -> float | None:
+        """Logarithm of the actions' standard deviation when this share of the training is done; None: it is learned."""
+        del done
+        return None
 
     def training_arguments(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
         """The environment's arguments for the training, from those of the evaluation."""
@@ -141,6 +148,15 @@ class PPOSettings(AlgorithmSettings):
     """An update ends early past this divergence; never when None."""
     log_std_init: float = -1.5
     """Natural logarithm of the actions' first standard deviation, in units of the supply voltage."""
+    log_std_final: float | None = None
+    """What it falls to, linearly over the training; learned when None. Learned, it falls as fast as noise costs power,
+    before the posture has been found."""
+
+    def planned_log_std(self, done: float) -> float | None:
+        """Linear from `log_std_init` to `log_std_final`, if there is one."""
+        if self.log_std_final is None:
+            return None
+        return self.log_std_init + (self.log_std_final - self.log_std_init) * min(1.0, done)
 
     @property
     def model_class(self) -> Any:
@@ -183,6 +199,8 @@ class SACSettings(AlgorithmSettings):
     """Control periods of every arm between two rounds of gradient steps."""
     gradient_steps: int = 8
     """Per round; -1 for as many as control periods were collected."""
+    huber_delta: float | None = 0.2
+    """Temporal-difference error [return] past which the critics' loss is linear; squared throughout when None."""
     tau: float = 0.005
     """Share by which the target critic follows."""
     ent_coef: str = "auto_0.02"
@@ -206,8 +224,8 @@ class SACSettings(AlgorithmSettings):
 
     @property
     def model_class(self) -> Any:
-        """Stable-Baselines3's SAC."""
-        from stable_baselines3 import SAC
+        """Stable-Baselines3's SAC with `huber_delta`."""
+        from agents.sac import SAC
 
         return SAC
 
@@ -218,7 +236,7 @@ class SACSettings(AlgorithmSettings):
         arguments = self._common(env, seed, log, "qf")
         # Clipped means would need an actor of another kind in the bundles.
         arguments["policy_kwargs"] |= {"log_std_init": self.log_std_init, "clip_mean": 0.0}
-        own = ("buffer_size", "batch_size", "train_freq", "gradient_steps", "tau")
+        own = ("buffer_size", "batch_size", "train_freq", "gradient_steps", "tau", "huber_delta")
         model = self.model_class(
             **arguments,
             **{name: getattr(self, name) for name in own},

@@ -89,7 +89,7 @@ import os, signal, sys
 from pathlib import Path
 from agents.keeper import Keeper
 from agents.train import train
-from tests.test_train import small_run
+from tests.test_train import SAC_KILLED, small_run
 
 def die(self):
     if self.num_timesteps > 600:
@@ -97,15 +97,20 @@ def die(self):
     return True
 
 Keeper._on_step = die
-train(small_run(Path(sys.argv[1]), checkpoint_seconds=0.0))
+changes = SAC_KILLED if sys.argv[2] == "sac" else {}
+train(small_run(Path(sys.argv[1]), checkpoint_seconds=float(sys.argv[3]), **changes))
 """
+
+
+def kill(folder, algorithm, checkpoint_seconds):
+    command = [sys.executable, "-c", KILLED, str(folder), algorithm, str(checkpoint_seconds)]
+    killed = subprocess.run(command, cwd=Path(__file__).parent.parent, capture_output=True, check=False)
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
 
 
 def test_killed_run_goes_on_to_the_same_policy(done, tmp_path):
     folder = tmp_path / "run"
-    root = Path(__file__).parent.parent
-    killed = subprocess.run([sys.executable, "-c", KILLED, str(folder)], cwd=root, capture_output=True, check=False)
-    assert killed.returncode == -signal.SIGKILL, killed.stderr
+    kill(folder, "ppo", 0.0)
     assert [path.name for path in checkpoints(folder)] == ["checkpoint_000000000512"]
     result = train(small_run(folder), resume=True)
     assert result["finished"]
@@ -191,6 +196,22 @@ SAC_SMALL = SACSettings(
     learning_starts=1200,
     buffer_size=4000,
 )
+SAC_KILLED = {
+    "algorithm": "sac",
+    "settings": replace(SAC_SMALL, total_timesteps=800, learning_starts=400, evaluate_every=200),
+}
+
+
+def test_killed_sac_goes_on_to_the_same_policy(tmp_path):
+    whole, cut = small_run(tmp_path / "whole", **SAC_KILLED), small_run(tmp_path / "cut", **SAC_KILLED)
+    train(whole)
+    kill(cut.folder, "sac", 0.0)
+    assert [path.name for path in checkpoints(cut.folder)] == ["checkpoint_000000000600"]
+    assert train(cut, resume=True)["finished"]
+    columns = [[row[:1] + row[3:] for row in evaluations(run.folder)] for run in (whole, cut)]
+    np.testing.assert_allclose(*columns, rtol=1e-12)
+    for name, uncut in weights(whole.folder).items():
+        np.testing.assert_array_equal(weights(cut.folder)[name], uncut)
 
 
 def test_sac_checkpoint_holds_the_replay_buffer(tmp_path):
@@ -250,7 +271,23 @@ def test_staggered_arms_end_their_first_episodes_one_after_the_other():
     assert env.get_state()["episodes"]["steps"].tolist() == [0, *before[1:]]
 
 
-def test_price_of_power_rises_until_half_of_the_training():
+def test_price_of_power_goes_to_the_rewards_own():
     settings = replace(SMALL, first_energy_share=0.2)
     assert [settings.energy_share(done) for done in (0.0, 0.25, 0.5, 1.0)] == pytest.approx([0.2, 0.6, 1.0, 1.0])
+    settings = replace(SMALL, first_energy_share=3.0, energy_share_until=0.8)
+    assert [settings.energy_share(done) for done in (0.0, 0.4, 0.8, 1.0)] == pytest.approx([3.0, 2.0, 1.0, 1.0])
     assert SMALL.energy_share(0.0) == 1.0
+
+
+def test_exploration_follows_its_plan_whatever_the_gradients_say(tmp_path, monkeypatch):
+    seen = []
+
+    def look(self):
+        seen.append((self.num_timesteps, self.model.policy.log_std.detach().numpy().copy()))
+        return True
+
+    monkeypatch.setattr(Keeper, "_on_step", look)
+    train(small_run(tmp_path / "run", settings=replace(SMALL, log_std_init=-1.0, log_std_final=-3.0, n_epochs=2)))
+    for steps, log_std in seen:
+        # Set at the start of every rollout of 256 control periods.
+        np.testing.assert_allclose(log_std, -1.0 - 2.0 * ((steps - 1) // 256 * 256) / 1024, rtol=1e-6)
