@@ -38,14 +38,14 @@ class AlgorithmSettings(ABC):
     """At the start."""
     falling: bool = True
     """Whether the learning rate falls linearly to a twentieth."""
-    gamma: float = 0.97
+    gamma: float
     """Discount per control period."""
-    hidden: tuple[int, ...] = (128, 128)
+    hidden: tuple[int, ...]
     """Widths of the actor's layers."""
+    activation: Activation
+    """Between the layers."""
     critic_hidden: tuple[int, ...] | None = None
     """Widths of the critic's layers; the actor's when None."""
-    activation: Activation = "tanh"
-    """Between the layers."""
     use_sde: bool = False
     """Generalised state-dependent exploration instead of independent noise."""
     sde_sample_freq: int = -1
@@ -123,14 +123,17 @@ class AlgorithmSettings(ABC):
 class PPOSettings(AlgorithmSettings):
     """Proximal policy optimisation, chosen for this arm."""
 
-    total_timesteps: int = 1_500_000
-    num_envs: int = 64
-    learning_rate: float = 5e-4
-    n_steps: int = 64
+    total_timesteps: int = 2_500_000
+    num_envs: int = 128
+    learning_rate: float = 7e-4
+    gamma: float = 0.98
+    hidden: tuple[int, ...] = (64, 64)
+    activation: Activation = "silu"
+    n_steps: int = 32
     """Control periods per arm and update."""
     batch_size: int = 1024
     """Samples per gradient step."""
-    n_epochs: int = 10
+    n_epochs: int = 6
     """Passes over an update's samples."""
     gae_lambda: float = 0.95
     """Of the generalised advantage estimate."""
@@ -148,7 +151,7 @@ class PPOSettings(AlgorithmSettings):
     """An update ends early past this divergence; never when None."""
     log_std_init: float = -1.5
     """Natural logarithm of the actions' first standard deviation, in units of the supply voltage."""
-    log_std_final: float | None = None
+    log_std_final: float | None = -3.5
     """What it falls to, linearly over the training; learned when None. Learned, it falls as fast as noise costs power,
     before the posture has been found."""
 
@@ -183,12 +186,12 @@ class SACSettings(AlgorithmSettings):
     controller that works or from a narrow actor.
     """
 
-    total_timesteps: int = 70_000
+    total_timesteps: int = 160_000
     num_envs: int = 32
     learning_rate: float = 7e-4
     gamma: float = 0.95
     activation: Activation = "relu"
-    evaluate_every: int = 5_000
+    evaluate_every: int = 10_000
     hidden: tuple[int, ...] = (64, 64)
     critic_hidden: tuple[int, ...] | None = (128, 128)
     buffer_size: int = 200_000
@@ -199,7 +202,7 @@ class SACSettings(AlgorithmSettings):
     """Control periods of every arm between two rounds of gradient steps."""
     gradient_steps: int = 8
     """Per round; -1 for as many as control periods were collected."""
-    huber_delta: float | None = 0.2
+    huber_delta: float | None = 0.1
     """Temporal-difference error [return] past which the critics' loss is linear; squared throughout when None."""
     tau: float = 0.005
     """Share by which the target critic follows."""
@@ -279,20 +282,28 @@ class CloneSettings:
 ALGORITHMS: dict[str, type[AlgorithmSettings]] = {"ppo": PPOSettings, "sac": SACSettings}
 
 _PPO, _SAC = PPOSettings(), SACSettings()
-_QUICK = replace(
-    _PPO, num_envs=128, n_steps=32, n_epochs=6, gamma=0.98, learning_rate=7e-4, hidden=(64, 64), activation="silu"
-)
+_SHORT = replace(_PPO, log_std_final=None, total_timesteps=1_500_000)
 DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
-    ("ppo", "elbows2"): _PPO,
-    ("ppo", "elbows1"): replace(_PPO, gamma=0.98, total_timesteps=1_000_000),
-    ("ppo", "elbows0"): replace(_QUICK, first_energy_share=0.1, total_timesteps=2_000_000),
-    ("ppo", "table"): replace(_QUICK, total_timesteps=800_000),
-    ("ppo", "random"): _QUICK,
+    ("ppo", "elbows2"): replace(_PPO, gamma=0.97, start_noise=0.1, log_std_final=-4.0),
+    ("ppo", "elbows1"): replace(
+        _PPO,
+        total_timesteps=5_000_000,
+        start_noise=0.3,
+        first_energy_share=3.0,
+        energy_share_until=0.6,
+        log_std_init=-1.2,
+        evaluate_every=100_000,
+    ),
+    ("ppo", "elbows0"): replace(
+        _PPO, total_timesteps=5_000_000, first_energy_share=0.1, log_std_init=-1.2, evaluate_every=100_000
+    ),
+    ("ppo", "table"): replace(_SHORT, total_timesteps=800_000),
+    ("ppo", "random"): _SHORT,
     ("sac", "elbows2"): _SAC,
     ("sac", "elbows1"): _SAC,
     ("sac", "elbows0"): _SAC,
     ("sac", "table"): _SAC,
-    ("sac", "random"): replace(_SAC, total_timesteps=200_000),
+    ("sac", "random"): _SAC,
 }
 """Settings by algorithm and task."""
 

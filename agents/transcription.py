@@ -237,8 +237,9 @@ class Transcription:
         chosen = {"print_level": 0, "sb": "yes", "linear_solver": "mumps", **options}
         warm = {} if multipliers is None else {"lam_x0": multipliers[0], "lam_g0": multipliers[1]}
         if warm:
+            # A larger barrier would first drive the solution away from where it has already come.
             pushes = {f"warm_start_{part}_push": 1e-6 for part in ("bound", "mult_bound", "slack_bound")}
-            chosen = {"warm_start_init_point": "yes", "mu_init": 1e-4, **pushes, **chosen}
+            chosen = {"warm_start_init_point": "yes", "mu_init": 1e-6, **pushes, **chosen}
         solver = ca.nlpsol(
             "solver",
             "ipopt",

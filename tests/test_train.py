@@ -147,7 +147,7 @@ def test_run_is_neither_overwritten_nor_resumed_with_other_settings(done):
     with pytest.raises(ValueError, match="output must be free of earlier runs, or --resume be given, got"):
         train(run)
     other = replace(run, settings=replace(SMALL, gamma=0.5))
-    with pytest.raises(ValueError, match=r"settings.gamma of a resumed run must be 0.97 as in .* got 0.5"):
+    with pytest.raises(ValueError, match=r"settings.gamma of a resumed run must be 0.98 as in .* got 0.5"):
         train(other, resume=True)
 
 
