@@ -123,6 +123,16 @@ def test_simulator_reaches_the_predicted_cost_open_loop_and_under_the_lqr(short)
         assert -found == pytest.approx(solution.cost, rel=0.02)
 
 
+def test_a_warm_start_stays_where_the_last_solve_has_come(short):
+    from agents.optimal import variables
+
+    program, solution = short
+    x, multipliers, _ = program.solve(variables(program, solution.trajectory), 0.003)
+    again, _, stats = program.solve(x, 0.003, multipliers)
+    assert stats["iter_count"] <= 3
+    assert program.cost(again) == pytest.approx(program.cost(x), rel=1e-6)
+
+
 def test_an_impossible_problem_is_said_to_have_failed(short):
     from agents.optimal import SolveError, solve
 
