@@ -1,10 +1,10 @@
-"""Settings of the learning algorithms, one frozen dataclass each, and the defaults for every task."""
+"""Settings of the learning algorithms, one frozen dataclass each."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -277,43 +277,3 @@ class CloneSettings:
     """At the start; falls along half a cosine."""
     hidden: tuple[int, ...] = (128, 128)
     """Widths of the tanh layers."""
-
-
-ALGORITHMS: dict[str, type[AlgorithmSettings]] = {"ppo": PPOSettings, "sac": SACSettings}
-
-_PPO, _SAC = PPOSettings(), SACSettings()
-_SHORT = replace(_PPO, log_std_final=None, total_timesteps=1_500_000)
-DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
-    ("ppo", "elbows2"): replace(_PPO, gamma=0.97, start_noise=0.1, log_std_final=-4.0),
-    ("ppo", "elbows1"): replace(
-        _PPO,
-        total_timesteps=5_000_000,
-        start_noise=0.3,
-        first_energy_share=3.0,
-        energy_share_until=0.6,
-        log_std_init=-1.2,
-        evaluate_every=100_000,
-    ),
-    ("ppo", "elbows0"): replace(
-        _PPO, total_timesteps=5_000_000, first_energy_share=0.1, log_std_init=-1.2, evaluate_every=100_000
-    ),
-    ("ppo", "table"): replace(_SHORT, total_timesteps=800_000),
-    ("ppo", "random"): _SHORT,
-    ("sac", "elbows2"): _SAC,
-    ("sac", "elbows1"): _SAC,
-    ("sac", "elbows0"): _SAC,
-    ("sac", "table"): _SAC,
-    ("sac", "random"): _SAC,
-}
-"""Settings by algorithm and task."""
-
-
-def default_settings(algorithm: str, task: str) -> AlgorithmSettings:
-    """The settings of an algorithm for a task; for a task without an entry of its own, the algorithm's general ones.
-
-    Raises:
-        ValueError: there is no such algorithm.
-    """
-    if algorithm not in ALGORITHMS:
-        raise ValueError(f"algorithm must be one of {list(ALGORITHMS)}, got {algorithm!r}")
-    return DEFAULTS.get((algorithm, task), ALGORITHMS[algorithm]())

@@ -11,7 +11,8 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from agents.algorithms import ALGORITHMS, AlgorithmSettings, default_settings
+from agents.algorithms import AlgorithmSettings
+from agents.defaults import ALGORITHMS, default_settings
 from agents.tasks import task_name, task_settings
 
 
