@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from agents.files import write_csv
-from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES, ELBOW_COLOURS, ELBOW_NAMES, pyplot
+from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES, ELBOW_NAMES, pyplot
 from benchmarks.optimal import cached, cells
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def figure(places: Sequence[Mark], path: Path) -> None:
     for ax, elbows in zip(axes[0], counts, strict=True):
         points = front(elbows)
         if points:
-            ax.plot(*zip(*points, strict=True), "-", color=ELBOW_COLOURS[elbows], marker=".", label="optimal front")
+            ax.plot(*zip(*points, strict=True), "-", color="black", marker=".", label="optimal front")
         family = gain_family(places, elbows)
         if family:
             line = [(mark.error, mark.energy) for mark in family]
@@ -105,6 +105,6 @@ def figure(places: Sequence[Mark], path: Path) -> None:
     for ax in axes[0]:
         handles, labels = ax.get_legend_handles_labels()
         named.update(zip(labels, handles, strict=True))
-    fig.legend(named.values(), named.keys(), loc="outside upper center", ncols=5)
+    fig.legend(named.values(), named.keys(), loc="outside upper center", ncols=4)
     fig.savefig(path)
     plt.close(fig)
