@@ -62,6 +62,10 @@ class AlgorithmSettings(ABC):
     evaluate_every: int = 50_000
     """Control periods between two evaluations."""
 
+    def __post_init__(self) -> None:
+        if not 0.0 < self.energy_share_until <= 1.0:
+            raise ValueError(f"energy_share_until must lie in (0, 1], got {self.energy_share_until}")
+
     @property
     def log_interval(self) -> int:
         """Rollouts between two entries in TensorBoard."""

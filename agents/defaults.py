@@ -8,7 +8,7 @@ from agents.algorithms import AlgorithmSettings, PPOSettings, SACSettings
 
 ALGORITHMS: dict[str, type[AlgorithmSettings]] = {"ppo": PPOSettings, "sac": SACSettings}
 
-_PPO, _SAC = PPOSettings(), SACSettings()
+_PPO = PPOSettings()
 _SHORT = replace(_PPO, log_std_final=None, total_timesteps=1_500_000)
 DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
     ("ppo", "elbows2"): replace(_PPO, gamma=0.97, start_noise=0.1, log_std_final=-4.0),
@@ -26,13 +26,8 @@ DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
     ),
     ("ppo", "table"): replace(_SHORT, total_timesteps=800_000),
     ("ppo", "random"): _SHORT,
-    ("sac", "elbows2"): _SAC,
-    ("sac", "elbows1"): _SAC,
-    ("sac", "elbows0"): _SAC,
-    ("sac", "table"): _SAC,
-    ("sac", "random"): _SAC,
 }
-"""Settings by algorithm and task."""
+"""Settings by algorithm and task, where they are not the algorithm's general ones."""
 
 
 def default_settings(algorithm: str, task: str) -> AlgorithmSettings:

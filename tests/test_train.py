@@ -98,19 +98,19 @@ def die(self):
 
 Keeper._on_step = die
 changes = SAC_KILLED if sys.argv[2] == "sac" else {}
-train(small_run(Path(sys.argv[1]), checkpoint_seconds=float(sys.argv[3]), **changes))
+train(small_run(Path(sys.argv[1]), checkpoint_seconds=0.0, **changes))
 """
 
 
-def kill(folder, algorithm, checkpoint_seconds):
-    command = [sys.executable, "-c", KILLED, str(folder), algorithm, str(checkpoint_seconds)]
+def kill(folder, algorithm):
+    command = [sys.executable, "-c", KILLED, str(folder), algorithm]
     killed = subprocess.run(command, cwd=Path(__file__).parent.parent, capture_output=True, check=False)
     assert killed.returncode == -signal.SIGKILL, killed.stderr
 
 
 def test_killed_run_goes_on_to_the_same_policy(done, tmp_path):
     folder = tmp_path / "run"
-    kill(folder, "ppo", 0.0)
+    kill(folder, "ppo")
     assert [path.name for path in checkpoints(folder)] == ["checkpoint_000000000512"]
     result = train(small_run(folder), resume=True)
     assert result["finished"]
@@ -205,7 +205,7 @@ SAC_KILLED = {
 def test_killed_sac_goes_on_to_the_same_policy(tmp_path):
     whole, cut = small_run(tmp_path / "whole", **SAC_KILLED), small_run(tmp_path / "cut", **SAC_KILLED)
     train(whole)
-    kill(cut.folder, "sac", 0.0)
+    kill(cut.folder, "sac")
     assert [path.name for path in checkpoints(cut.folder)] == ["checkpoint_000000000600"]
     assert train(cut, resume=True)["finished"]
     columns = [[row[:1] + row[3:] for row in evaluations(run.folder)] for run in (whole, cut)]
@@ -277,6 +277,8 @@ def test_price_of_power_goes_to_the_rewards_own():
     settings = replace(SMALL, first_energy_share=3.0, energy_share_until=0.8)
     assert [settings.energy_share(done) for done in (0.0, 0.4, 0.8, 1.0)] == pytest.approx([3.0, 2.0, 1.0, 1.0])
     assert SMALL.energy_share(0.0) == 1.0
+    with pytest.raises(ValueError, match=r"energy_share_until must lie in \(0, 1\], got 0"):
+        replace(SMALL, energy_share_until=0.0)
 
 
 def test_exploration_follows_its_plan_whatever_the_gradients_say(tmp_path, monkeypatch):
