@@ -187,42 +187,53 @@ class SACSettings(AlgorithmSettings):
     """Soft actor-critic, chosen for this arm.
 
     Stock settings start with uniform voltages up to 24 V, which fling the arm about: here the first data come from a
-    controller that works or from a narrow actor.
+    controller that works, and the first actor imitates it, or both from a narrow actor.
     """
 
-    total_timesteps: int = 160_000
-    num_envs: int = 32
+    total_timesteps: int = 1_400_000
+    num_envs: int = 128
     learning_rate: float = 7e-4
     gamma: float = 0.95
     activation: Activation = "relu"
-    evaluate_every: int = 10_000
+    evaluate_every: int = 100_000
     hidden: tuple[int, ...] = (64, 64)
     critic_hidden: tuple[int, ...] | None = (128, 128)
-    buffer_size: int = 200_000
+    buffer_size: int = 1_000_000
     """Control periods remembered, of all arms together."""
     batch_size: int = 256
     """Samples per gradient step."""
     train_freq: int = 1
     """Control periods of every arm between two rounds of gradient steps."""
-    gradient_steps: int = 8
+    gradient_steps: int = 4
     """Per round; -1 for as many as control periods were collected."""
     huber_delta: float | None = 0.1
     """Temporal-difference error [return] past which the critics' loss is linear; squared throughout when None."""
     tau: float = 0.005
     """Share by which the target critic follows."""
+    actor_rate: float = 0.2
+    """The actor's learning rate over the critics'."""
+    center_tau: float = 0.002
+    """Share by which the centre of the critics' quadratic form follows the actor."""
+    critic_head_start: int = 1500
+    """Gradient steps of the critics before the actor's first."""
+    proximity: float = 0.0
+    """Weight of half the squared departure of the actor's mean from the centre, in the actor's loss."""
     ent_coef: str = "auto_0.02"
     """Weight of the entropy: a number, or "auto" or "auto_START" to have it learned."""
-    target_entropy: float | None = -25.0
+    target_entropy: float | None = -12.0
     """What a learned weight aims at [nat]; minus the number of joints when None."""
     log_std_init: float = -2.0
     """Natural logarithm of the actor's first spread, before the squashing."""
-    learning_starts: int = 10_000
+    learning_starts: int = 64_000
     """Control periods of `warm_start` data, before the first gradient step."""
     warm_start: Literal["uniform", "actor", "pd"] = "pd"
     """Where they come from: uniform voltages, the untrained narrow actor, or computed torque with noise, which is the
     PD with the model's feed-forward and, unlike the paper's, bears being read at 50 Hz."""
     warm_start_noise: float = 0.1
     """Standard deviation of that noise, in units of the supply voltage."""
+    imitation_steps: int = 2000
+    """Gradient steps in which the first actor learns what computed torque did, before any of the critics'; none where
+    the data come from elsewhere."""
 
     @property
     def log_interval(self) -> int:
@@ -231,19 +242,23 @@ class SACSettings(AlgorithmSettings):
 
     @property
     def model_class(self) -> Any:
-        """Stable-Baselines3's SAC with `huber_delta`."""
+        """Stable-Baselines3's SAC with quadratic critics."""
         from agents.sac import SAC
 
         return SAC
 
     def model(self, env: Any, seed: int, log: Path) -> Any:
-        """Stable-Baselines3's SAC; `agents.warm_start` fills its replay buffer."""
+        """The SAC; `agents.warm_start` fills its replay buffer."""
         import torch
 
         arguments = self._common(env, seed, log, "qf")
         # Clipped means would need an actor of another kind in the bundles.
         arguments["policy_kwargs"] |= {"log_std_init": self.log_std_init, "clip_mean": 0.0}
-        own = ("buffer_size", "batch_size", "train_freq", "gradient_steps", "tau", "huber_delta")
+        names = env.get_attr("observation_names", 0)[0]
+        firsts = [names.index(f"{name}_x [m]") for name in ("hand_error", "lookahead_error")]
+        arguments["policy_kwargs"]["vectors"] = [(first, first + 3) for first in firsts]
+        own = ("buffer_size", "batch_size", "train_freq", "gradient_steps", "tau")
+        own += ("huber_delta", "actor_rate", "center_tau", "critic_head_start", "proximity")
         model = self.model_class(
             **arguments,
             **{name: getattr(self, name) for name in own},

@@ -97,9 +97,11 @@ def _prepare(run: Run, model: Any, env: Any, keeper: Any) -> None:
 
         take_over(model, load_policy(run.initial_policy))
     if isinstance(run.settings, SACSettings) and run.settings.warm_start != "uniform":
-        from agents.warm_start import fill
+        from agents.warm_start import fill, imitate
 
-        fill(model, run.settings, env, run.seed, keeper.show)
+        shown = fill(model, run.settings, env, run.seed, keeper.show)
+        if len(shown.actions) and run.initial_policy is None:
+            imitate(model, shown, run.settings.imitation_steps, run.seed)
 
 
 def train_all(runs: Sequence[Run], workers: int = 2, resume: bool = False) -> list[dict[str, Any]]:

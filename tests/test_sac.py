@@ -1,41 +1,205 @@
-"""The SAC with Huber's loss: Stable-Baselines3's own without it, deaf to large errors with it."""
+"""The SAC: critics that are quadratic around the actor's slow copy, deaf to large errors."""
 
+from itertools import pairwise
+
+import gymnasium
 import numpy as np
 import pytest
-import stable_baselines3
 import torch
 from gymnasium.envs.classic_control import PendulumEnv
+from gymnasium.spaces import Box
 from gymnasium.wrappers import TimeLimit
 
-from agents.sac import SAC
+from agents.critic import QuadraticCritics
+from agents.sac import SAC, Batch
 
 
-def trained(model_class, **arguments):
-    model = model_class(
+def small(env=None, **arguments):
+    return SAC(
         "MlpPolicy",
-        TimeLimit(PendulumEnv(), 200),
-        learning_starts=20,
+        TimeLimit(PendulumEnv(), 200) if env is None else env,
         policy_kwargs={"net_arch": [8]},
         seed=0,
         device="cpu",
-        **arguments,
+        **{"learning_starts": 20, **arguments},
     )
-    return model.learn(60)
 
 
-@pytest.mark.parametrize("arguments", [{}, {"ent_coef": 0.1}, {"use_sde": True}, {"n_steps": 3}])
-def test_squared_loss_is_stable_baselines3s_own(arguments):
-    expected = trained(stable_baselines3.SAC, **arguments).policy.state_dict()
-    for name, weights in trained(SAC, **arguments).policy.state_dict().items():
-        np.testing.assert_allclose(weights, expected[name], rtol=1e-4, atol=1e-6, err_msg=name)
+def weights(module):
+    return torch.nn.utils.parameters_to_vector(module.parameters()).detach().clone()
 
 
-def test_linear_loss_pulls_no_harder_however_large_the_error(tmp_path):
-    model = trained(SAC, huber_delta=0.2)
+def critics(vectors=((1, 4),)):
+    torch.manual_seed(0)
+    return QuadraticCritics(4, 3, (6, 7), vectors, rank=2), torch.randn(5, 4)
+
+
+def test_critics_see_lengths_and_stretched_vectors():
+    both, _ = critics([(1, 4), (2, 4)])
+    seen = both.sharpened(torch.tensor([[0.3, 0.0, 0.03, -0.04]]))
+    expected = [0.3, 0.0, 0.03, -0.04, 0.05, 0.05]
+    expected += [0.5 * np.arcsinh(50.0 * value) for value in (0.0, 0.03, -0.04, 0.03, -0.04)]
+    assert seen[0].tolist() == pytest.approx([3.0 * value for value in expected], abs=1e-6)
+
+
+def test_critics_are_two_plain_networks_side_by_side():
+    both, observation = critics()
+    for k in range(2):
+        x = both.sharpened(observation)
+        for j, (weight, bias) in enumerate(zip(both.weights, both.biases, strict=True)):
+            x = torch.nn.functional.linear(torch.relu(x) if j else x, weight[k].T, bias[k, 0])
+        value, slope, curvature, factors = both(observation)
+        expected = x.split((1, 3, 3, 6), -1)
+        torch.testing.assert_close(value[k], expected[0][:, 0])
+        torch.testing.assert_close(slope[k], expected[1])
+        torch.testing.assert_close(curvature[k], torch.log1p(torch.exp(expected[2])))
+        torch.testing.assert_close(factors[k], expected[3].reshape(5, 2, 3))
+
+
+def test_quadratic_is_the_form_that_its_parts_say():
+    both, observation = critics()
+    quadratic = both(observation)
+    departure = torch.randn(5, 3, requires_grad=True)
+    form = torch.diag_embed(quadratic.curvature) + quadratic.factors.mT @ quadratic.factors
+    expected = quadratic.value + (quadratic.slope * departure).sum(-1)
+    expected = expected - 0.5 * torch.einsum("bi,kbij,bj->kb", departure, form, departure)
+    torch.testing.assert_close(quadratic(departure), expected)
+    torch.testing.assert_close(quadratic(torch.zeros(5, 3)), quadratic.value)
+    (slope,) = torch.autograd.grad(quadratic(departure)[1].sum(), departure)
+    expected = quadratic.slope[1] - torch.einsum("bij,bj->bi", form[1], departure)
+    torch.testing.assert_close(slope, expected)
+    assert torch.linalg.eigvalsh(form).min() > 0.0
+    assert not quadratic.detach()(departure.detach()).requires_grad
+
+
+def test_linear_loss_pulls_no_harder_however_large_the_error():
     value = torch.tensor([[0.0], [0.1], [2.0], [2000.0]], requires_grad=True)
-    loss = model._loss(value, torch.zeros(4, 1))
+    loss = small(huber_delta=0.2)._loss(value, torch.zeros(4, 1))
     assert loss.item() == pytest.approx((0.1**2 / 2 + 0.2 * (2.0 - 0.1) + 0.2 * (2000.0 - 0.1)) / 4)
     loss.backward()
     assert (4 * value.grad.ravel()).tolist() == pytest.approx([0.0, 0.1, 0.2, 0.2])
+    squared = small()._loss(torch.tensor([1.0, 3.0]), torch.zeros(2))
+    assert squared.item() == pytest.approx((1.0 + 9.0) / 4)
+
+
+def test_target_is_the_reward_and_the_worse_critics_discounted_value_with_the_entropy():
+    model = small(ent_coef=0.5)
+    after = torch.randn(3, 3)
+    batch = Batch(
+        torch.zeros(3, 3), torch.zeros(3, 1), torch.tensor([1.0, 2.0, 3.0]), torch.tensor([0.9, 0.0, 0.9]), after
+    )
+    torch.manual_seed(1)
+    target = model._target(batch, torch.tensor(0.5))
+    torch.manual_seed(1)
+    action, log_prob = model.actor.action_log_prob(after)
+    values = model.critic_target(after)(action - model.policy.center(after)).detach()
+    expected = batch.reward + batch.discount * (values.min(0).values - 0.5 * log_prob.detach())
+    torch.testing.assert_close(target, expected)
+    assert target[1] == 2.0
+
+
+def test_actor_waits_for_the_critics_and_the_centre_trails_it():
+    model = small(critic_head_start=30, center_tau=0.25, actor_rate=0.1)
+    actor, critic = weights(model.actor), weights(model.critic)
+    model.learn(50)
+    assert (model._n_updates, model.num_timesteps) == (30, 50)
+    assert not torch.equal(weights(model.critic), critic)
+    assert torch.equal(weights(model.actor), actor)
+    mean = torch.nn.Sequential(*model.actor.latent_pi, model.actor.mu)
+    start = weights(mean)
+    assert torch.equal(weights(model.policy.center), start)
+    model.train(1, 16)
+    first = weights(mean)
+    assert not torch.equal(first, start)
+    assert torch.equal(weights(model.policy.center), start)
+    rates = [optimizer.param_groups[0]["lr"] for optimizer in (model.actor.optimizer, model.critic.optimizer)]
+    assert rates == pytest.approx([0.1 * 3e-4, 3e-4])
+    model.train(1, 16)
+    torch.testing.assert_close(weights(model.policy.center), start + 0.25 * (first - start))
+    model.train(1, 16)
+    assert model._n_updates == 33
+
+
+def test_proximity_holds_the_actor_to_the_centre():
+    def departure(proximity):
+        model = small(proximity=proximity, learning_rate=3e-3, center_tau=0.0)
+        model.learn(200)
+        mean = torch.nn.Sequential(*model.actor.latent_pi, model.actor.mu, torch.nn.Tanh())
+        observation = torch.from_numpy(model.replay_buffer.observations[:200, 0])
+        return (mean(observation) - model.policy.center(observation)).abs().mean().item()
+
+    assert departure(1e4) < 0.2 * departure(0.0)
+
+
+def test_actor_climbs_the_slope_and_learned_weight_of_the_entropy_meets_its_target():
+    model = small(ent_coef="auto_0.1", target_entropy=-1.0, learning_starts=0)
+    model.learn(1)
+    before = model.log_ent_coef.item()
+    # A log-probability above minus the target means too little entropy: its price rises.
+    model._price_entropy(torch.tensor([3.0]))
+    assert model.log_ent_coef.item() > before
+
+
+class Bandit(gymnasium.Env):
+    """One period an episode, whose best action follows from the observation."""
+
+    observation_space = Box(-1.0, 1.0, (2,))
+    action_space = Box(-1.0, 1.0, (2,))
+    form = np.array([[2.0, 0.8], [0.8, 1.0]])
+
+    def best(self, observation):
+        return 0.5 * observation[..., ::-1] * [1.0, -1.0]
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.seen = self.np_random.uniform(-1.0, 1.0, 2).astype(np.float32)
+        return self.seen, {}
+
+    def step(self, action):
+        miss = action - self.best(self.seen)
+        return self.seen, -0.5 * float(miss @ self.form @ miss), True, False, {}
+
+
+def test_learns_the_best_action_of_a_quadratic_problem():
+    model = SAC(
+        "MlpPolicy",
+        Bandit(),
+        learning_rate=3e-3,
+        learning_starts=500,
+        policy_kwargs={"net_arch": [32]},
+        ent_coef=0.002,
+        actor_rate=0.5,
+        center_tau=0.02,
+        seed=0,
+        device="cpu",
+    )
+    model.learn(1500)
+    observation = np.random.default_rng(0).uniform(-0.8, 0.8, (50, 2)).astype(np.float32)
+    action, _ = model.predict(observation, deterministic=True)
+    untrained = np.abs(Bandit().best(observation)).mean()
+    assert np.abs(action - Bandit().best(observation)).mean() < 0.2 * untrained
+    quadratic = model.critic(torch.from_numpy(observation))
+    form = torch.diag_embed(quadratic.curvature) + quadratic.factors.mT @ quadratic.factors
+    np.testing.assert_allclose(form.mean((0, 1)).detach().numpy(), Bandit.form, atol=0.3)
+
+
+def test_saved_model_comes_back_with_its_centre(tmp_path):
+    model = small(huber_delta=0.2, actor_rate=0.3, center_tau=0.01, critic_head_start=5)
+    model.learn(40)
     model.save(tmp_path / "model")
-    assert SAC.load(tmp_path / "model").huber_delta == 0.2
+    again = SAC.load(tmp_path / "model")
+    names = ("huber_delta", "actor_rate", "center_tau", "critic_head_start", "_n_updates")
+    assert [getattr(again, name) for name in names] == [0.2, 0.3, 0.01, 5, 20]
+    for (name, expected), loaded in zip(
+        model.policy.state_dict().items(), again.policy.state_dict().values(), strict=True
+    ):
+        assert torch.equal(loaded, expected), name
+    assert any(name.startswith("center") for name in again.policy.state_dict())
+
+
+@pytest.mark.parametrize("arguments", [{}, {"use_sde": True}, {"n_steps": 3}, {"gradient_steps": -1, "train_freq": 4}])
+def test_same_seed_gives_the_same_weights(arguments):
+    first, second = (small(**arguments).learn(60).policy.state_dict() for _ in range(2))
+    assert all(torch.equal(first[name], second[name]) for name in first)
+    moved = pairwise(small(**arguments).learn(steps).policy.state_dict()["center.0.weight"] for steps in (20, 60))
+    assert all(not torch.equal(*both) for both in moved)

@@ -239,18 +239,27 @@ def test_warm_start_shows_how_the_task_is_done(tmp_path):
     from stable_baselines3.common.vec_env import VecMonitor
 
     from agents.metered import MeteredVectorEnv
-    from agents.warm_start import fill
+    from agents.warm_start import fill, imitate
     from elbow_gym.sb3 import SB3VecEnv
 
     sac = replace(SAC_SMALL, learning_starts=1000, warm_start_noise=0.05)
     env = MeteredVectorEnv(4)
     model = sac.model(VecMonitor(SB3VecEnv(env)), 0, tmp_path)
-    fill(model, sac, env, seed=0)
+    shown = fill(model, sac, env, seed=0)
     seen = env.episodes.layout.decode(model.replay_buffer.next_observations[100:250])
     assert np.median(np.linalg.norm(seen["hand_error"], axis=-1)) < 0.05
     assert np.ptp(model.replay_buffer.actions[:250] - 0.0) > 0.5
     narrow = model.predict(model.replay_buffer.observations[0], deterministic=False)[0]
     assert np.abs(narrow).max() < 0.6
+    # The noise that the buffer holds is not shown.
+    noise = model.replay_buffer.actions[:250] - shown.actions
+    assert shown.actions.shape == (250, 4, 10)
+    assert np.abs(noise.mean(axis=(0, 2))).max() < 0.01 < noise.std()
+    imitate(model, shown, 300, seed=0)
+    own = model.predict(shown.observations.reshape(1000, -1), deterministic=True)[0]
+    np.testing.assert_allclose(own, shown.actions.reshape(1000, -1), atol=0.5)
+    assert np.abs(own - shown.actions.reshape(1000, -1)).mean() < 0.3 * np.abs(shown.actions).mean()
+    assert not len(fill(model, replace(sac, warm_start="actor", learning_starts=1100), env, seed=0).actions)
 
 
 def test_staggered_arms_end_their_first_episodes_one_after_the_other():
