@@ -151,6 +151,8 @@ class PPOSettings(AlgorithmSettings):
     """Gradients are clipped here."""
     normalize_advantage: bool = True
     """Per batch."""
+    adam_epsilon: float = 1e-5
+    """Adam's: gradients well below it move little."""
     target_kl: float | None = None
     """An update ends early past this divergence; never when None."""
     log_std_init: float = -1.5
@@ -176,7 +178,7 @@ class PPOSettings(AlgorithmSettings):
         """Stable-Baselines3's PPO."""
         arguments = self._common(env, seed, log, "vf")
         arguments["policy_kwargs"]["log_std_init"] = self.log_std_init
-        arguments["policy_kwargs"]["optimizer_kwargs"]["eps"] = 1e-5
+        arguments["policy_kwargs"]["optimizer_kwargs"]["eps"] = self.adam_epsilon
         own = ("n_steps", "batch_size", "n_epochs", "gae_lambda", "clip_range", "ent_coef", "vf_coef", "max_grad_norm")
         own += ("normalize_advantage", "target_kl")
         return self.model_class(**arguments, **{name: getattr(self, name) for name in own})

@@ -15,14 +15,26 @@ DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
     ("ppo", "elbows1"): replace(
         _PPO,
         total_timesteps=5_000_000,
-        start_noise=0.3,
+        start_noise=0.1,
         first_energy_share=3.0,
         energy_share_until=0.6,
         log_std_init=-1.2,
+        log_std_final=-3.8,
+        adam_epsilon=1e-8,
         evaluate_every=100_000,
     ),
     ("ppo", "elbows0"): replace(
         _PPO, total_timesteps=5_000_000, first_energy_share=0.1, log_std_init=-1.2, evaluate_every=100_000
+    ),
+    ("sac", "elbows1"): SACSettings(
+        total_timesteps=1_200_000,
+        gamma=0.97,
+        actor_rate=0.1,
+        center_tau=0.001,
+        critic_head_start=4000,
+        proximity=5.0,
+        target_entropy=-15.0,
+        log_std_init=-3.0,
     ),
     ("ppo", "table"): replace(_SHORT, total_timesteps=800_000),
     ("ppo", "random"): _SHORT,

@@ -33,7 +33,7 @@ CONTROLLER_NAMES = {
     "computed_torque_posture": "computed torque, posture",
     "lqr": "LQR on the optimum",
     "ppo": "PPO, 24 V",
-    "sac": "SAC, 24 V",
+    "sac": "SAC from computed torque",
     "clone": "clone of the optimum",
     "ppo_cloned": "PPO from the optimum's clone",
     "ppo_random": "PPO, drawn arms and circles",
