@@ -41,6 +41,9 @@ class CentredPolicy(SACPolicy):
         size, joints = (spaces.flatdim(space) for space in (self.observation_space, self.action_space))
         return QuadraticCritics(size, joints, hidden, self.vectors).to(self.device)
 
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        return {**super()._get_constructor_parameters(), "vectors": self.vectors}
+
     def follow(self, share: float) -> None:
         """Moves the centre by this share of its way to the actor's mean."""
         ahead = (parameter for layer in (self.actor.latent_pi, self.actor.mu) for parameter in layer.parameters())

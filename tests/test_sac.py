@@ -11,14 +11,14 @@ from gymnasium.spaces import Box
 from gymnasium.wrappers import TimeLimit
 
 from agents.critic import QuadraticCritics
-from agents.sac import SAC, Batch
+from agents.sac import SAC, Batch, CentredPolicy
 
 
 def small(env=None, **arguments):
     return SAC(
         "MlpPolicy",
         TimeLimit(PendulumEnv(), 200) if env is None else env,
-        policy_kwargs={"net_arch": [8]},
+        policy_kwargs={"net_arch": [8], "vectors": [(0, 2)]},
         seed=0,
         device="cpu",
         **{"learning_starts": 20, **arguments},
@@ -194,6 +194,9 @@ def test_saved_model_comes_back_with_its_centre(tmp_path):
         model.policy.state_dict().items(), again.policy.state_dict().values(), strict=True
     ):
         assert torch.equal(loaded, expected), name
+    model.policy.save(tmp_path / "policy")
+    alone = CentredPolicy.load(tmp_path / "policy")
+    assert alone.critic.vectors == (slice(0, 2),)
     assert any(name.startswith("center") for name in again.policy.state_dict())
 
 
