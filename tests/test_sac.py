@@ -1,5 +1,6 @@
 """The SAC: critics that are quadratic around the actor's slow copy, deaf to large errors."""
 
+import copy
 from itertools import pairwise
 
 import gymnasium
@@ -9,6 +10,7 @@ import torch
 from gymnasium.envs.classic_control import PendulumEnv
 from gymnasium.spaces import Box
 from gymnasium.wrappers import TimeLimit
+from stable_baselines3.common.logger import configure
 
 from agents.critic import QuadraticCritics
 from agents.sac import SAC, Batch, CentredPolicy
@@ -96,6 +98,23 @@ def test_target_is_the_reward_and_the_worse_critics_discounted_value_with_the_en
     expected = batch.reward + batch.discount * (values.min(0).values - 0.5 * log_prob.detach())
     torch.testing.assert_close(target, expected)
     assert target[1] == 2.0
+
+
+def test_actor_is_paid_by_the_worse_critic_and_for_its_entropy():
+    model = small(ent_coef=0.5, actor_rate=1.0)
+    before = copy.deepcopy(model.policy)
+    observation, after = torch.randn(8, 3), torch.randn(8, 3)
+    model._logger = configure(None, [])
+    batch = Batch(observation, torch.zeros(8, 1), torch.zeros(8), torch.ones(8), after)
+    torch.manual_seed(1)
+    _, loss = model._step(batch)
+    torch.manual_seed(1)
+    before.actor.action_log_prob(after)
+    action, log_prob = before.actor.action_log_prob(observation)
+    values = before.critic(observation)(action - before.center(observation))
+    assert loss == pytest.approx((0.5 * log_prob - values.min(0).values).mean().item(), rel=1e-5)
+    assert (values.argmin(0) == 0).any()
+    assert (values.argmin(0) == 1).any()
 
 
 def test_actor_waits_for_the_critics_and_the_centre_trails_it():
