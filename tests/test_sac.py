@@ -119,6 +119,9 @@ def test_actor_is_paid_by_the_worse_critic_and_for_its_entropy():
 
 def test_actor_waits_for_the_critics_and_the_centre_trails_it():
     model = small(critic_head_start=30, center_tau=0.25, actor_rate=0.1)
+    with torch.no_grad():
+        # Whatever the actor was given after it was built: the centre starts there.
+        model.actor.mu.bias.add_(0.1)
     actor, critic = weights(model.actor), weights(model.critic)
     model.learn(50)
     assert (model._n_updates, model.num_timesteps) == (30, 50)
