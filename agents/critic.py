@@ -10,10 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-STRETCH = 50.0
-"""Values far below its inverse are made larger, far above it smaller."""
-GAIN = 3.0
-"""Of all that the networks see: larger inputs let them bend more sharply."""
+from agents.foresight import Foresight, Sharpened
 
 
 class Quadratic(NamedTuple):
@@ -47,30 +44,18 @@ class QuadraticCritics(nn.Module):
     """Two networks side by side from the observation to a `Quadratic` each.
 
     Args:
-        n_observations: entries of the observation.
+        view: what the networks see of the observation.
         n_actions: joints.
         hidden: widths of the ReLU layers.
-        vectors: first and last-plus-one entry of each part of the observation whose length costs, such as an error. The
-            value has a cone's tip where it vanishes, which a network of these widths rounds off by centimetres: it
-            also sees the length, and the part with its small values stretched.
         rank: of what couples the joints.
     """
 
     optimizer: torch.optim.Optimizer
 
-    def __init__(
-        self,
-        n_observations: int,
-        n_actions: int,
-        hidden: Sequence[int],
-        vectors: Sequence[tuple[int, int]] = (),
-        rank: int = 4,
-    ) -> None:
+    def __init__(self, view: Sharpened | Foresight, n_actions: int, hidden: Sequence[int], rank: int = 4) -> None:
         super().__init__()
-        self.n_actions, self.rank = n_actions, rank
-        self.vectors = tuple(slice(*vector) for vector in vectors)
-        seen = n_observations + sum(1 + end - first for first, end in vectors)
-        sizes = (seen, *hidden, 1 + (2 + rank) * n_actions)
+        self.view, self.n_actions, self.rank = view, n_actions, rank
+        sizes = (view.size, *hidden, 1 + (2 + rank) * n_actions)
         self.weights, self.biases = nn.ParameterList(), nn.ParameterList()
         for size, after in pairwise(sizes):
             # As torch draws its linear layers.
@@ -79,8 +64,8 @@ class QuadraticCritics(nn.Module):
             self.biases.append(nn.Parameter(torch.empty(2, 1, after).uniform_(-bound, bound)))
 
     def forward(self, observation: Tensor) -> Quadratic:
-        """Of (B, n_observations)."""
-        seen = self.sharpened(observation)
+        """Of B observations."""
+        seen = self.view(observation)
         x = seen.expand(2, *seen.shape)
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             x = torch.baddbmm(bias, functional.relu(x) if k else x, weight)
@@ -91,13 +76,6 @@ class QuadraticCritics(nn.Module):
             functional.softplus(curvature),
             factors.unflatten(-1, (self.rank, self.n_actions)),
         )
-
-    def sharpened(self, observation: Tensor) -> Tensor:
-        """What the networks see: the observation, lengths and stretched vectors."""
-        vectors = [observation[:, vector] for vector in self.vectors]
-        lengths = [vector.norm(dim=1, keepdim=True) for vector in vectors]
-        stretched = [0.5 * torch.asinh(STRETCH * vector) for vector in vectors]
-        return GAIN * torch.cat((observation, *lengths, *stretched), dim=1)
 
     def set_training_mode(self, mode: bool) -> None:
         """What Stable-Baselines3 calls `train`."""

@@ -106,7 +106,7 @@ class Keeper(BaseCallback):
     def _on_rollout_start(self) -> None:
         done = self.num_timesteps / self._run.settings.total_timesteps
         self._env.set_energy_weight(self._run.settings.energy_share(done) * self._settings.energy_weight)
-        self._explore(self._run.settings.planned_log_std(done))
+        self._run.settings.explore(self.model, done)
         every = self._run.settings.evaluate_every
         if self.num_timesteps // every > self._evaluated // every:
             self.evaluate(self.model)
@@ -116,12 +116,6 @@ class Keeper(BaseCallback):
                 # Nobody waits for this seed any more, and whoever resumes it would train beside it.
                 raise KeyboardInterrupt
             self.checkpoint(self.model)
-
-    def _explore(self, log_std: float | None) -> None:
-        if log_std is not None:
-            policy: Any = self.model.policy
-            policy.log_std.requires_grad_(False)
-            policy.log_std.fill_(log_std)
 
     def _on_rollout_end(self) -> None:
         self.show(self.num_timesteps)

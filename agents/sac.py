@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from agents.critic import QuadraticCritics
+from agents.foresight import Foresight, Sharpened
 
 
 class CentredPolicy(SACPolicy):
@@ -22,11 +23,11 @@ class CentredPolicy(SACPolicy):
 
     Args:
         arguments: those of Stable-Baselines3's `SACPolicy`.
-        vectors: those of the critics.
+        view: what the critics see of the observation; all of it, and nothing besides, when None.
     """
 
-    def __init__(self, *positional: Any, vectors: Sequence[tuple[int, int]] = (), **arguments: Any) -> None:
-        self.vectors = vectors
+    def __init__(self, *positional: Any, view: Sharpened | Foresight | None = None, **arguments: Any) -> None:
+        self.view = view
         super().__init__(*positional, **arguments)
 
     def _build(self, lr_schedule: Any) -> None:
@@ -35,14 +36,14 @@ class CentredPolicy(SACPolicy):
         self.center = torch.nn.Sequential(*copy.deepcopy(layers), torch.nn.Tanh()).requires_grad_(False)
 
     def make_critic(self, features_extractor: Any = None) -> Any:
-        """Quadratic ones, on the observation as it is."""
+        """Quadratic ones."""
         del features_extractor
         hidden: Any = self.critic_kwargs["net_arch"]
         size, joints = (spaces.flatdim(space) for space in (self.observation_space, self.action_space))
-        return QuadraticCritics(size, joints, hidden, self.vectors).to(self.device)
+        return QuadraticCritics(self.view or Sharpened(size), joints, hidden).to(self.device)
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
-        return {**super()._get_constructor_parameters(), "vectors": self.vectors}
+        return {**super()._get_constructor_parameters(), "view": self.view}
 
     def follow(self, share: float) -> None:
         """Moves the centre by this share of its way to the actor's mean."""

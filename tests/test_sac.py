@@ -13,6 +13,7 @@ from gymnasium.wrappers import TimeLimit
 from stable_baselines3.common.logger import configure
 
 from agents.critic import QuadraticCritics
+from agents.foresight import Sharpened
 from agents.sac import SAC, Batch, CentredPolicy
 
 
@@ -20,7 +21,7 @@ def small(env=None, **arguments):
     return SAC(
         "MlpPolicy",
         TimeLimit(PendulumEnv(), 200) if env is None else env,
-        policy_kwargs={"net_arch": [8], "vectors": [(0, 2)]},
+        policy_kwargs={"net_arch": [8], "view": Sharpened(3, [slice(0, 2)])},
         seed=0,
         device="cpu",
         **{"learning_starts": 20, **arguments},
@@ -31,23 +32,15 @@ def weights(module):
     return torch.nn.utils.parameters_to_vector(module.parameters()).detach().clone()
 
 
-def critics(vectors=((1, 4),)):
+def critics():
     torch.manual_seed(0)
-    return QuadraticCritics(4, 3, (6, 7), vectors, rank=2), torch.randn(5, 4)
-
-
-def test_critics_see_lengths_and_stretched_vectors():
-    both, _ = critics([(1, 4), (2, 4)])
-    seen = both.sharpened(torch.tensor([[0.3, 0.0, 0.03, -0.04]]))
-    expected = [0.3, 0.0, 0.03, -0.04, 0.05, 0.05]
-    expected += [0.5 * np.arcsinh(50.0 * value) for value in (0.0, 0.03, -0.04, 0.03, -0.04)]
-    assert seen[0].tolist() == pytest.approx([3.0 * value for value in expected], abs=1e-6)
+    return QuadraticCritics(Sharpened(4, [slice(1, 4)]), 3, (6, 7), rank=2), torch.randn(5, 4)
 
 
 def test_critics_are_two_plain_networks_side_by_side():
     both, observation = critics()
     for k in range(2):
-        x = both.sharpened(observation)
+        x = both.view(observation)
         for j, (weight, bias) in enumerate(zip(both.weights, both.biases, strict=True)):
             x = torch.nn.functional.linear(torch.relu(x) if j else x, weight[k].T, bias[k, 0])
         value, slope, curvature, factors = both(observation)
@@ -218,7 +211,7 @@ def test_saved_model_comes_back_with_its_centre(tmp_path):
         assert torch.equal(loaded, expected), name
     model.policy.save(tmp_path / "policy")
     alone = CentredPolicy.load(tmp_path / "policy")
-    assert alone.critic.vectors == (slice(0, 2),)
+    assert alone.critic.view.vectors == (slice(0, 2),)
     assert any(name.startswith("center") for name in again.policy.state_dict())
 
 

@@ -195,6 +195,7 @@ SAC_SMALL = SACSettings(
     batch_size=32,
     learning_starts=1200,
     buffer_size=4000,
+    imitation_steps=50,
 )
 SAC_KILLED = {
     "algorithm": "sac",
@@ -302,3 +303,21 @@ def test_exploration_follows_its_plan_whatever_the_gradients_say(tmp_path, monke
     for steps, log_std in seen:
         # Set at the start of every rollout of 256 control periods.
         np.testing.assert_allclose(log_std, -1.0 - 2.0 * ((steps - 1) // 256 * 256) / 1024, rtol=1e-6)
+
+
+def test_entropy_aimed_at_follows_its_plan(tmp_path, monkeypatch):
+    seen = []
+
+    def look(self):
+        seen.append((self.num_timesteps, self.model.target_entropy))
+        return True
+
+    monkeypatch.setattr(Keeper, "_on_step", look)
+    settings = replace(SAC_SMALL, target_entropy=-10.0, target_entropy_final=-20.0)
+    train(small_run(tmp_path / "run", algorithm="sac", settings=settings))
+    for steps, entropy in seen:
+        # Set at the start of every round of one control period of four arms.
+        assert entropy == pytest.approx(-10.0 - 10.0 * (steps - 4) / 1240)
+    assert seen[-1][1] < -19.0
+    with pytest.raises(ValueError, match="target_entropy must be a number where there is a target_entropy_final"):
+        replace(SAC_SMALL, target_entropy=None, target_entropy_final=-20.0)
