@@ -27,14 +27,13 @@ DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
         _PPO, total_timesteps=5_000_000, first_energy_share=0.1, log_std_init=-1.2, evaluate_every=100_000
     ),
     ("sac", "elbows1"): SACSettings(
-        total_timesteps=4_800_000,
+        total_timesteps=6_000_000,
         gamma=0.97,
-        first_energy_share=2.5,
-        actor_rate=0.1,
-        center_tau=0.001,
+        first_energy_share=2.0,
         critic_head_start=4000,
-        proximity=5.0,
+        proximity=1.0,
         target_entropy=-15.0,
+        target_entropy_final=-26.0,
         log_std_init=-3.0,
     ),
     ("ppo", "table"): replace(_SHORT, total_timesteps=800_000),
