@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from agents.controller import Controller
+from agents.controller import EFFORT, Controller
 from agents.evaluate import CLASSICAL, SHIFTED, policy_maker, settings_for
 from agents.lqr import TimeVaryingLQR
 from agents.metrics import REGIMES, Regime
@@ -28,8 +28,6 @@ PARTS = {
 """Parts of the benchmark and what they are."""
 GAINS = (0.25, 0.5, 2.0, 4.0)
 """By which both gains of the paper's PD are multiplied in the sweep beside it."""
-EFFORT = {"pd_smooth": 2.0, "pd_gravity": 2.5, "computed_torque": 3.0, "computed_torque_posture": 8.0, "lqr": 8.0}
-"""Of a control period, times the PD's, for an honest time left; starting takes part of it."""
 
 
 @dataclass(frozen=True)

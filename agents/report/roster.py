@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
-from agents.controller import Controller
+from agents.controller import EFFORT, Controller
 from agents.evaluate import CLASSICAL, named_controller
 from agents.figures import CASES
 from agents.lqr import TimeVaryingLQR
@@ -20,19 +21,6 @@ SHOWN_AS = {"pd": "pd_24v"}
 """Names in the benchmark's tables where they differ from the command line's."""
 TABLE = "table"
 """Name of the compliant table where others have their number of elbows."""
-# What one episode takes beside one of the paper's PD without a limit, for an honest time left.
-EFFORT = {
-    "pd_paper": 1.0,
-    "pd": 0.2,
-    "pd_smooth": 0.4,
-    "pd_gravity": 0.5,
-    "computed_torque": 0.15,
-    "computed_torque_posture": 0.8,
-    "lqr": 0.3,
-}
-LEAST_EFFORT = 0.05
-EPISODE = 10_000
-"""Units of work that one episode of effort 1 counts."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +47,10 @@ class Entry:
         """What the arm leans on: its number of elbows, or `TABLE`."""
         return TABLE if self.env == "ElbowArmTable-v0" else str(self.elbows)
 
-    @property
+    @cached_property
     def size(self) -> int:
-        """Work to be done, all episodes together."""
-        return round(EPISODE * EFFORT.get(self.name, LEAST_EFFORT)) * len(STARTS)
+        """Work to be done, all episodes together, in control periods of the PD."""
+        return round(EFFORT.get(self.name, 1.0) * self.contender()[0].horizon) * len(STARTS)
 
     def contender(self) -> tuple[Settings, Callable[[ElbowArmVectorEnv], Controller]]:
         """The environment and the maker of the controller."""
