@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 
 import tyro
 
-from agents.algorithms import CloneSettings
 from agents.cli import run
+from agents.clone_settings import CloneSettings
 from agents.train_command import train_command
 
 CLONE = CloneSettings()

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.algorithms import CloneSettings
+from agents.clone_settings import CloneSettings
 from agents.files import write_text
 from agents.lqr import TimeVaryingLQR
 from agents.policy import Policy, PolicyCard

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.algorithms import CloneSettings
+from agents.clone_settings import CloneSettings
 from agents.cloning import clone, clone_all
 from agents.keeper import evaluation
 from agents.lqr import TimeVaryingLQR
