@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from agents.algorithms import AlgorithmSettings, PPOSettings, SACSettings
+from agents.algorithms import AlgorithmSettings
+from agents.ppo_settings import PPOSettings
+from agents.sac_settings import SACSettings
 
 ALGORITHMS: dict[str, type[AlgorithmSettings]] = {"ppo": PPOSettings, "sac": SACSettings}
 

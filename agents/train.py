@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
-from agents.algorithms import SACSettings
 from agents.checkpoint import checkpoints, load_checkpoint, load_progress
 from agents.files import write_text
 from agents.run import Run
+from agents.sac_settings import SACSettings
 from elbow_gym.settings import Settings
 
 SEED_STRIDE = 1_000_000

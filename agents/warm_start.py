@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.algorithms import SACSettings
 from agents.classical import ComputedTorque
 from agents.policy import Policy, actor_layers
+from agents.sac_settings import SACSettings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 

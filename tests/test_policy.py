@@ -9,8 +9,8 @@ import torch
 from stable_baselines3 import PPO
 
 import agents.policy as policies
-from agents.algorithms import SACSettings
 from agents.policy import Policy, load_policy, policy_of, shipped_policies
+from agents.sac_settings import SACSettings
 from agents.tasks import task_name
 from elbow_gym.env import ElbowArmEnv
 from elbow_gym.sb3 import SB3VecEnv

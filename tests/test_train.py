@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 from stable_baselines3 import PPO
 
-from agents.algorithms import PPOSettings, SACSettings
 from agents.checkpoint import checkpoints
 from agents.keeper import COLUMNS, Keeper
 from agents.metered import MeteredVectorEnv
 from agents.policy import load_policy
+from agents.ppo_settings import PPOSettings
 from agents.run import Run
+from agents.sac_settings import SACSettings
 from agents.train import train, train_all
 from elbow_gym.settings import Settings
 
