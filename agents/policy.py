@@ -242,7 +242,7 @@ def policy_of(model: Any, settings: Settings, command: str, env: str = "ElbowArm
     """
     import torch
 
-    actor = actor_layers(model)
+    actor = played_layers(model)
     linear = [layer for layer in actor if isinstance(layer, torch.nn.Linear)]
     kinds = {type(layer).__name__.lower() for layer in actor} - {"linear"}
     if len(kinds) != 1:
@@ -265,8 +265,13 @@ def policy_of(model: Any, settings: Settings, command: str, env: str = "ElbowArm
     return Policy(card, weights)
 
 
+def played_layers(model: Any) -> list[Any]:
+    """The torch layers from the observation to what an SB3 model of PPO's or SAC's kind does deterministically."""
+    return list(model.policy.average)[:-1] if hasattr(model.policy, "average") else actor_layers(model)
+
+
 def actor_layers(model: Any) -> list[Any]:
-    """The torch layers from the observation to the mean action of an SB3 model of PPO's or SAC's kind."""
+    """The torch layers from the observation to the mean action of the actor that learns."""
     if hasattr(model.policy, "actor"):
         return [*model.policy.actor.latent_pi, model.policy.actor.mu]
     return [*model.policy.mlp_extractor.policy_net, model.policy.action_net]

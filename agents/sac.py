@@ -19,7 +19,10 @@ from agents.foresight import Foresight, Sharpened
 
 
 class CentredPolicy(SACPolicy):
-    """Actor, twin `QuadraticCritics` and their targets, and the centre: a copy of the actor's mean that follows it.
+    """Actor, twin `QuadraticCritics` and their targets, and two copies of the actor's mean that follow it.
+
+    The nearer is the centre of the critics' quadratic form. The farther is the average of the actors of the training's
+    last while, which does not follow the critics' every turn: it is what deterministic predictions are.
 
     Args:
         arguments: those of Stable-Baselines3's `SACPolicy`.
@@ -34,6 +37,7 @@ class CentredPolicy(SACPolicy):
         super()._build(lr_schedule)
         layers = [*self.actor.latent_pi, self.actor.mu]
         self.center = torch.nn.Sequential(*copy.deepcopy(layers), torch.nn.Tanh()).requires_grad_(False)
+        self.average = copy.deepcopy(self.center)
 
     def make_critic(self, features_extractor: Any = None) -> Any:
         """Quadratic ones."""
@@ -45,10 +49,14 @@ class CentredPolicy(SACPolicy):
     def _get_constructor_parameters(self) -> dict[str, Any]:
         return {**super()._get_constructor_parameters(), "view": self.view}
 
-    def follow(self, share: float) -> None:
-        """Moves the centre by this share of its way to the actor's mean."""
-        ahead = (parameter for layer in (self.actor.latent_pi, self.actor.mu) for parameter in layer.parameters())
-        _approach(self.center.parameters(), ahead, share)
+    def _predict(self, observation: Any, deterministic: bool = False) -> Tensor:
+        return self.average(observation) if deterministic else self.actor(observation)
+
+    def follow(self, center: float, average: float) -> None:
+        """Moves the centre and the average by these shares of their ways to the actor's mean."""
+        ahead = [parameter for layer in (self.actor.latent_pi, self.actor.mu) for parameter in layer.parameters()]
+        _approach(self.center.parameters(), ahead, center)
+        _approach(self.average.parameters(), ahead, average)
 
 
 class Batch(NamedTuple):
@@ -79,6 +87,7 @@ class SAC(stable_baselines3.SAC):
             the loss is squared throughout when None.
         actor_rate: the actor's learning rate over the critics'.
         center_tau: share by which the centre follows the actor at each gradient step.
+        average_tau: the same of the average, which is what deterministic predictions are.
         critic_head_start: gradient steps before the actor's first.
         proximity: weight of half the squared departure of the actor's mean from the centre, in its loss: a curvature
             that holds it back wherever the critics know of none.
@@ -94,13 +103,21 @@ class SAC(stable_baselines3.SAC):
         huber_delta: float | None = None,
         actor_rate: float = 0.2,
         center_tau: float = 0.002,
+        average_tau: float = 0.0005,
         critic_head_start: int = 0,
         proximity: float = 0.0,
         **arguments: Any,
     ) -> None:
         self.huber_delta, self.actor_rate = huber_delta, actor_rate
-        self.center_tau, self.critic_head_start, self.proximity = center_tau, critic_head_start, proximity
+        self.center_tau, self.average_tau = center_tau, average_tau
+        self.critic_head_start, self.proximity = critic_head_start, proximity
         super().__init__(*positional, **arguments)
+
+    def _setup_learn(self, *positional: Any, **arguments: Any) -> Any:
+        if self._n_updates == 0:
+            # The actor may have been given other weights since it was built.
+            self.policy.follow(1.0, 1.0)
+        return super()._setup_learn(*positional, **arguments)
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
         """So many gradient steps of critics, weight of the entropy, actor, target critics and centre."""
@@ -128,7 +145,7 @@ class SAC(stable_baselines3.SAC):
     def _step(self, batch: Batch) -> tuple[float, float]:
         """One gradient step; the losses of critics and actor."""
         learning = self._n_updates >= self.critic_head_start
-        self.policy.follow(self.center_tau if self._n_updates > self.critic_head_start else 1.0)
+        self.policy.follow(self.center_tau, self.average_tau)
         ent_coef, center = self._ent_coef(), self.policy.center(batch.observation)
         quadratic: Any = self.critic(batch.observation)
         values, target = quadratic(batch.action - center), self._target(batch, ent_coef)

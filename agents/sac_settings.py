@@ -41,6 +41,8 @@ class SACSettings(AlgorithmSettings):
     """The actor's learning rate over the critics'."""
     center_tau: float = 0.002
     """Share by which the centre of the critics' quadratic form follows the actor."""
+    average_tau: float = 0.0005
+    """Share by which the average of the actors, which is the policy, follows the actor."""
     critic_head_start: int = 1500
     """Gradient steps of the critics before the actor's first."""
     proximity: float = 0.0
@@ -100,7 +102,7 @@ class SACSettings(AlgorithmSettings):
         episodes = env.get_attr("episodes", 0)[0]
         arguments["policy_kwargs"]["view"] = Foresight(episodes.layout, episodes.arm, episodes.pose)
         own = ("buffer_size", "batch_size", "train_freq", "gradient_steps", "tau")
-        own += ("huber_delta", "actor_rate", "center_tau", "critic_head_start", "proximity")
+        own += ("huber_delta", "actor_rate", "center_tau", "average_tau", "critic_head_start", "proximity")
         model = self.model_class(
             **arguments,
             **{name: getattr(self, name) for name in own},

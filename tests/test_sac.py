@@ -111,7 +111,7 @@ def test_actor_is_paid_by_the_worse_critic_and_for_its_entropy():
 
 
 def test_actor_waits_for_the_critics_and_the_centre_trails_it():
-    model = small(critic_head_start=30, center_tau=0.25, actor_rate=0.1)
+    model = small(critic_head_start=30, center_tau=0.25, average_tau=0.125, actor_rate=0.1)
     with torch.no_grad():
         # Whatever the actor was given after it was built: the centre starts there.
         model.actor.mu.bias.add_(0.1)
@@ -123,6 +123,7 @@ def test_actor_waits_for_the_critics_and_the_centre_trails_it():
     mean = torch.nn.Sequential(*model.actor.latent_pi, model.actor.mu)
     start = weights(mean)
     assert torch.equal(weights(model.policy.center), start)
+    assert torch.equal(weights(model.policy.average), start)
     model.train(1, 16)
     first = weights(mean)
     assert not torch.equal(first, start)
@@ -131,8 +132,22 @@ def test_actor_waits_for_the_critics_and_the_centre_trails_it():
     assert rates == pytest.approx([0.1 * 3e-4, 3e-4])
     model.train(1, 16)
     torch.testing.assert_close(weights(model.policy.center), start + 0.25 * (first - start))
+    torch.testing.assert_close(weights(model.policy.average), start + 0.125 * (first - start))
     model.train(1, 16)
     assert model._n_updates == 33
+
+
+def test_deterministic_predictions_are_the_average_and_others_the_actor():
+    model = small()
+    with torch.no_grad():
+        model.actor.mu.bias.fill_(0.5)
+        model.actor.log_std.weight.zero_()
+        model.actor.log_std.bias.fill_(-20.0)
+    observation = np.zeros((4, 3), np.float32)
+    before = model.predict(observation, deterministic=True)[0]
+    assert np.abs(model.predict(observation)[0] - before).min() > 0.1
+    model.policy.follow(0.0, 1.0)
+    np.testing.assert_allclose(model.predict(observation, deterministic=True)[0], model.predict(observation)[0], 1e-6)
 
 
 def test_proximity_holds_the_actor_to_the_centre():
@@ -185,6 +200,7 @@ def test_learns_the_best_action_of_a_quadratic_problem():
         ent_coef=0.002,
         actor_rate=0.5,
         center_tau=0.02,
+        average_tau=0.02,
         seed=0,
         device="cpu",
     )
@@ -199,12 +215,12 @@ def test_learns_the_best_action_of_a_quadratic_problem():
 
 
 def test_saved_model_comes_back_with_its_centre(tmp_path):
-    model = small(huber_delta=0.2, actor_rate=0.3, center_tau=0.01, critic_head_start=5)
+    model = small(huber_delta=0.2, actor_rate=0.3, center_tau=0.01, average_tau=0.03, critic_head_start=5)
     model.learn(40)
     model.save(tmp_path / "model")
     again = SAC.load(tmp_path / "model")
-    names = ("huber_delta", "actor_rate", "center_tau", "critic_head_start", "_n_updates")
-    assert [getattr(again, name) for name in names] == [0.2, 0.3, 0.01, 5, 20]
+    names = ("huber_delta", "actor_rate", "center_tau", "average_tau", "critic_head_start", "_n_updates")
+    assert [getattr(again, name) for name in names] == [0.2, 0.3, 0.01, 0.03, 5, 20]
     for (name, expected), loaded in zip(
         model.policy.state_dict().items(), again.policy.state_dict().values(), strict=True
     ):
