@@ -160,7 +160,7 @@ class SAC(stable_baselines3.SAC):
             # The critics' weights take no gradients from the actor's loss.
             actor_loss = (ent_coef * log_prob - quadratic.detach()(action - center).amin(0)).mean()
             if self.proximity > 0.0:
-                mean = torch.tanh(self.actor.mu(self.actor.latent_pi(batch.observation)))
+                mean = torch.tanh(self.actor.action_dist.distribution.mean)
                 actor_loss = actor_loss + 0.5 * self.proximity * (mean - center).square().sum(-1).mean()
             _descend(self.actor.optimizer, actor_loss)
         _approach(self.critic_target.parameters(), self.critic.parameters(), self.tau)
