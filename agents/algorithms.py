@@ -75,8 +75,8 @@ class AlgorithmSettings(ABC):
         """Multiple of the energy weight when this share of the training is done."""
         return self.first_energy_share + (1.0 - self.first_energy_share) * min(1.0, done / self.energy_share_until)
 
-    def explore(self, model: Any, done: float) -> None:
-        """Sets how widely the model explores when this share of the training is done, where that follows a plan."""
+    def follow_plan(self, model: Any, done: float) -> None:
+        """Sets what follows a plan, such as how widely the model explores, when this share of the training is done."""
         del model, done
 
     def training_arguments(self, arguments: Mapping[str, Any]) -> dict[str, Any]:

@@ -106,7 +106,7 @@ class Keeper(BaseCallback):
     def _on_rollout_start(self) -> None:
         done = self.num_timesteps / self._run.settings.total_timesteps
         self._env.set_energy_weight(self._run.settings.energy_share(done) * self._settings.energy_weight)
-        self._run.settings.explore(self.model, done)
+        self._run.settings.follow_plan(self.model, done)
         every = self._run.settings.evaluate_every
         if self.num_timesteps // every > self._evaluated // every:
             self.evaluate(self.model)

@@ -47,7 +47,7 @@ class PPOSettings(AlgorithmSettings):
     """What it falls to, linearly over the training; learned when None. Learned, it falls as fast as noise costs power,
     before the posture has been found."""
 
-    def explore(self, model: Any, done: float) -> None:
+    def follow_plan(self, model: Any, done: float) -> None:
         """The actions' log_std is linear from `log_std_init` to `log_std_final`, if there is one."""
         if self.log_std_final is not None:
             log_std = self.log_std_init + (self.log_std_final - self.log_std_init) * min(1.0, done)

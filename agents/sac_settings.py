@@ -27,8 +27,8 @@ class SACSettings(AlgorithmSettings):
     critic_hidden: tuple[int, ...] | None = (128, 128)
     buffer_size: int = 1_000_000
     """Control periods remembered, of all arms together."""
-    batch_size: int = 256
-    """Samples per gradient step."""
+    batch_size: int = 1024
+    """Samples per gradient step. With a quarter of them the actor's first steps lead to falls with every seed."""
     train_freq: int = 1
     """Control periods of every arm between two rounds of gradient steps."""
     gradient_steps: int = 4
@@ -47,6 +47,10 @@ class SACSettings(AlgorithmSettings):
     """Gradient steps of the critics before the actor's first."""
     proximity: float = 0.0
     """Weight of half the squared departure of the actor's mean from the centre, in the actor's loss."""
+    first_proximity: float | None = None
+    """What `proximity` starts at, if it falls: critics that know little yet must not move the actor far."""
+    proximity_until: float = 0.5
+    """Share of the training after which `proximity`, falling geometrically, is its own."""
     ent_coef: str = "auto_0.02"
     """Weight of the entropy: a number, or "auto" or "auto_START" to have it learned."""
     target_entropy: float | None = -12.0
@@ -71,9 +75,20 @@ class SACSettings(AlgorithmSettings):
         super().__post_init__()
         if self.target_entropy_final is not None and self.target_entropy is None:
             raise ValueError("target_entropy must be a number where there is a target_entropy_final, got None")
+        if self.first_proximity is not None and not min(self.first_proximity, self.proximity) > 0.0:
+            both = (self.first_proximity, self.proximity)
+            raise ValueError(f"first_proximity and proximity must be positive for one to fall to the other, got {both}")
+        if not 0.0 < self.proximity_until <= 1.0:
+            raise ValueError(f"proximity_until must lie in (0, 1], got {self.proximity_until}")
 
-    def explore(self, model: Any, done: float) -> None:
-        """The entropy aimed at is linear from `target_entropy` to `target_entropy_final`, if there is one."""
+    def follow_plan(self, model: Any, done: float) -> None:
+        """The entropy aimed at is linear from `target_entropy` to `target_entropy_final`, if there is one.
+
+        The proximity falls geometrically from `first_proximity`, if there is one.
+        """
+        if self.first_proximity is not None:
+            left = max(0.0, 1.0 - done / self.proximity_until)
+            model.proximity = self.proximity * (self.first_proximity / self.proximity) ** left
         if self.target_entropy is not None and self.target_entropy_final is not None:
             fall = self.target_entropy_final - self.target_entropy
             model.target_entropy = self.target_entropy + fall * min(1.0, done)

@@ -306,19 +306,27 @@ def test_exploration_follows_its_plan_whatever_the_gradients_say(tmp_path, monke
         np.testing.assert_allclose(log_std, -1.0 - 2.0 * ((steps - 1) // 256 * 256) / 1024, rtol=1e-6)
 
 
-def test_entropy_aimed_at_follows_its_plan(tmp_path, monkeypatch):
+def test_entropy_aimed_at_and_proximity_follow_their_plans(tmp_path, monkeypatch):
     seen = []
 
     def look(self):
-        seen.append((self.num_timesteps, self.model.target_entropy))
+        seen.append((self.num_timesteps, self.model.target_entropy, self.model.proximity))
         return True
 
     monkeypatch.setattr(Keeper, "_on_step", look)
-    settings = replace(SAC_SMALL, target_entropy=-10.0, target_entropy_final=-20.0)
+    settings = replace(SAC_SMALL, target_entropy=-10.0, target_entropy_final=-20.0, proximity=2.0)
+    settings = replace(settings, first_proximity=200.0, proximity_until=0.98)
     train(small_run(tmp_path / "run", algorithm="sac", settings=settings))
-    for steps, entropy in seen:
+    for steps, entropy, proximity in seen:
         # Set at the start of every round of one control period of four arms.
-        assert entropy == pytest.approx(-10.0 - 10.0 * (steps - 4) / 1240)
+        done = (steps - 4) / 1240
+        assert entropy == pytest.approx(-10.0 - 10.0 * done)
+        assert proximity == pytest.approx(max(2.0, 2.0 * 100.0 ** (1.0 - done / 0.98)))
+    assert {2.0} < {proximity for _, _, proximity in seen}
     assert seen[-1][1] < -19.0
     with pytest.raises(ValueError, match="target_entropy must be a number where there is a target_entropy_final"):
         replace(SAC_SMALL, target_entropy=None, target_entropy_final=-20.0)
+    with pytest.raises(ValueError, match=r"first_proximity and proximity must be positive .* got \(3.0, 0.0\)"):
+        replace(SAC_SMALL, first_proximity=3.0)
+    with pytest.raises(ValueError, match=r"proximity_until must lie in \(0, 1\], got 0.0"):
+        replace(SAC_SMALL, proximity_until=0.0)
