@@ -12,14 +12,17 @@ ALGORITHMS: dict[str, type[AlgorithmSettings]] = {"ppo": PPOSettings, "sac": SAC
 
 _PPO = PPOSettings()
 _SHORT = replace(_PPO, log_std_final=None, total_timesteps=1_500_000)
-# An arm that may fall: a longer horizon, and critics that learn for longer before the actor moves, and it slowly.
+# An arm that may fall: a longer horizon, critics that learn for longer before the actor moves, and an actor that moves
+# slowly and at first next to nowhere.
 _SAC_SLOW = SACSettings(
     total_timesteps=4_000_000,
     gamma=0.97,
     actor_rate=0.1,
     center_tau=0.001,
     critic_head_start=4000,
-    proximity=5.0,
+    proximity=10.0,
+    first_proximity=100.0,
+    proximity_until=0.4,
     target_entropy=-15.0,
     target_entropy_final=-25.0,
     log_std_init=-3.0,
@@ -40,7 +43,14 @@ DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
     ("ppo", "elbows0"): replace(
         _PPO, total_timesteps=5_000_000, first_energy_share=0.1, log_std_init=-1.2, evaluate_every=100_000
     ),
-    ("sac", "elbows1"): replace(_SAC_SLOW, total_timesteps=5_000_000, first_energy_share=2.5),
+    ("sac", "elbows1"): replace(
+        _SAC_SLOW,
+        total_timesteps=5_000_000,
+        center_tau=0.002,
+        proximity=1.0,
+        proximity_until=0.5,
+        first_energy_share=2.5,
+    ),
     ("sac", "elbows0"): _SAC_SLOW,
     ("ppo", "table"): replace(_SHORT, total_timesteps=800_000),
     ("ppo", "random"): _SHORT,
