@@ -20,7 +20,7 @@ class SACSettings(AlgorithmSettings):
     total_timesteps: int = 5_600_000
     num_envs: int = 512
     learning_rate: float = 7e-4
-    gamma: float = 0.95
+    gamma: float = 0.97
     activation: Activation = "relu"
     evaluate_every: int = 200_000
     hidden: tuple[int, ...] = (64, 64)
