@@ -46,7 +46,7 @@ DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
         _SAC_SLOW,
         total_timesteps=5_000_000,
         center_tau=0.002,
-        proximity=1.0,
+        proximity=3.0,
         proximity_until=0.5,
         first_energy_share=2.5,
     ),
