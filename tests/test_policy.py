@@ -56,7 +56,8 @@ def test_squashed_actor_acts_as_the_model_that_it_came_from(use_sde, tmp_path):
     model = SACSettings(hidden=(8, 8), buffer_size=10, use_sde=use_sde).model(arms, 0, tmp_path)
     with torch.no_grad():
         model.actor.mu.weight.mul_(3000.0)
-    model.policy.follow(0.0, 1.0)
+    # Half of the way, so that what is played differs from the actor.
+    model.policy.follow(0.0, 0.5)
     squashed = policy_of(model, settings, command="test")
     squashed.check(ElbowArmEnv(**env))
     observation = np.random.default_rng(0).normal(size=(7, squashed.card.layers[0])).astype(np.float32)
