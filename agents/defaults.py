@@ -15,7 +15,7 @@ _SHORT = replace(_PPO, log_std_final=None, total_timesteps=1_500_000)
 # An arm that may fall: a longer horizon, critics that learn for longer before the actor moves, and an actor that moves
 # slowly, at first next to nowhere.
 _SAC_SLOW = SACSettings(
-    total_timesteps=3_600_000,
+    total_timesteps=5_000_000,
     gamma=0.98,
     actor_rate=0.1,
     center_tau=0.001,
