@@ -28,8 +28,8 @@ class SACSettings(AlgorithmSettings):
     buffer_size: int = 1_000_000
     """Control periods remembered, of all arms together."""
     batch_size: int = 1024
-    """Samples per gradient step. With a quarter of them the critics know too little of the actor's first steps: with one
-    elbow they ended in a fall (a return of -742 instead of -113)."""
+    """Samples per gradient step. With a quarter of them the critics know too little of the actor's first steps: with
+    one elbow they ended in a fall (a return of -742 instead of -113)."""
     train_freq: int = 1
     """Control periods of every arm between two rounds of gradient steps."""
     gradient_steps: int = 4
