@@ -92,10 +92,10 @@ def fill(
 
 
 def imitate(model: Any, shown: Demonstrations, steps: int, seed: int, batch_size: int = 512) -> None:
-    """Fits the mean of the actor of an SB3 model of SAC's kind to demonstrations, by squared error.
+    """Fits the mean of the actor of an `agents.sac.SAC` to demonstrations, by squared error; its copies go along.
 
     Args:
-        model: Stable-Baselines3's.
+        model: the SAC.
         shown: at least one control period.
         steps: gradient steps, at a rate that falls linearly from 0.002.
         seed: of the batches.
@@ -115,3 +115,4 @@ def imitate(model: Any, shown: Demonstrations, steps: int, seed: int, batch_size
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
+    model.policy.follow(1.0, 1.0)
