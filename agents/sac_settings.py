@@ -43,7 +43,7 @@ class SACSettings(AlgorithmSettings):
     center_tau: float = 0.002
     """Share by which the centre of the critics' quadratic form follows the actor."""
     average_tau: float = 0.0005
-    """Share by which the average of the actors, which is the policy, follows the actor."""
+    """Share by which the average of the actors, which is the policy, follows the actor; 1 for the last actor itself."""
     critic_head_start: int = 1500
     """Gradient steps of the critics before the actor's first."""
     proximity: float = 0.0
