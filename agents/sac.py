@@ -120,7 +120,7 @@ class SAC(stable_baselines3.SAC):
         return super()._setup_learn(*positional, **arguments)
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
-        """So many gradient steps of critics, weight of the entropy, actor, target critics and centre."""
+        """So many gradient steps of critics, weight of the entropy, actor, target critics, centre and average."""
         self.policy.set_training_mode(True)
         optimizers = [self.actor.optimizer, self.critic.optimizer]
         if self.ent_coef_optimizer is not None:
