@@ -45,6 +45,7 @@ def clone(
     elbows: int = 2,
     seeds: int = 1,
     first_seed: int = 0,
+    resume: bool = False,
     output: Path = Path("runs"),
     trajectory: Path | None = None,
     settings: Annotated[CloneSettings, tyro.conf.arg(name="")] = CLONE,
@@ -55,6 +56,7 @@ def clone(
         elbows: elbows on the table.
         seeds: how many networks.
         first_seed: the first of the seeds.
+        resume: seeds that are finished are left alone, the others start anew.
         output: folder of the runs.
         trajectory: what is cloned; the benchmark's optimum for the elbow count when not given.
         settings: of the imitation.
@@ -67,7 +69,8 @@ def clone(
     folders = [output / f"clone_elbows{elbows}_seed{seed}" for seed in chosen]
     source = OPTIMA / f"elbows{elbows}.npz" if trajectory is None else trajectory
     command = " ".join(["python -m agents", *sys.argv[1:]])
-    for result in clone_all(Settings(elbows=elbows), source, settings, chosen, folders, command).values():
+    results = clone_all(Settings(elbows=elbows), source, settings, chosen, folders, command, resume)
+    for result in results.values():
         print(f"{result['name']}: {result['training_seconds']:.0f} s, return {result['best']['return']:.2f}")
 
 

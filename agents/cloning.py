@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import time
 from collections.abc import Callable
@@ -18,6 +19,7 @@ from agents.clone_settings import CloneSettings
 from agents.files import write_text
 from agents.lqr import TimeVaryingLQR
 from agents.policy import Policy, PolicyCard
+from agents.run import check_run, machine, open_run, versions
 from agents.trajectory import Trajectory
 from agents.workers import Job, Tell, in_processes
 from elbow_gym.settings import Settings
@@ -118,28 +120,51 @@ def _policy(
 
 
 def clone_all(
-    settings: Settings, trajectory: Path, how: CloneSettings, seeds: list[int], folders: list[Path], command: str
+    settings: Settings,
+    trajectory: Path,
+    how: CloneSettings,
+    seeds: list[int],
+    folders: list[Path],
+    command: str,
+    resume: bool = False,
 ) -> dict[int, dict[str, Any]]:
     """Clones with several seeds side by side in processes, with a progress bar; the results by seed.
 
-    Each folder gets what a training's has: `best.json` and `best.safetensors`, `evaluations.csv` and `result.json`.
+    Each folder gets what a training's has: `run.json`, `best.json` and `best.safetensors`, `evaluations.csv` and
+    `result.json`. With `resume` the seeds that are finished are left alone; the others, a minute each, start anew.
 
     Raises:
-        ValueError: there is no such trajectory, or a folder holds a run already.
+        ValueError: there is no such trajectory, or a folder holds a run already and `resume` is not set or it had
+            other settings.
     """
     from tqdm import tqdm
 
     if not trajectory.is_file():
         raise ValueError(f"trajectory must be a file that `python -m benchmarks optimal` wrote, got no {trajectory}")
-    for folder in folders:
-        if (folder / "result.json").exists():
-            raise ValueError(f"output must be free of earlier runs, got {folder}")
-    jobs = {
-        seed: Job(partial(_clone_one, settings, trajectory, how, seed, folder, command), how.rounds)
-        for seed, folder in zip(seeds, folders, strict=True)
+    results: dict[int, dict[str, Any]] = {}
+    jobs: dict[int, Job[dict[str, Any]]] = {}
+    for seed, folder in zip(seeds, folders, strict=True):
+        check_run(folder, _record(settings, trajectory, how, seed), resume)
+        finished = folder / "result.json"
+        if finished.is_file():
+            results[seed] = json.loads(finished.read_text(encoding="utf-8"))
+        else:
+            jobs[seed] = Job(partial(_clone_one, settings, trajectory, how, seed, folder, command), how.rounds)
+    if jobs:
+        with tqdm(total=len(jobs) * how.rounds, unit="round", desc="clone") as bar:
+            results.update(in_processes(jobs, bar.update))
+    return {seed: results[seed] for seed in seeds}
+
+
+def _record(settings: Settings, trajectory: Path, how: CloneSettings, seed: int) -> dict[str, Any]:
+    """What makes the run the run that it is, JSON types only."""
+    plain = {
+        "environment": settings.arguments,
+        "trajectory": hashlib.sha256(trajectory.read_bytes()).hexdigest(),
+        "settings": asdict(how),
+        "seed": seed,
     }
-    with tqdm(total=len(jobs) * how.rounds, unit="round", desc="clone") as bar:
-        return in_processes(jobs, bar.update)
+    return json.loads(json.dumps(plain))
 
 
 def _clone_one(
@@ -149,9 +174,9 @@ def _clone_one(
     import torch
 
     from agents.keeper import evaluation, evaluation_row, evaluation_seeds, write_evaluations
-    from agents.run import machine, versions
 
     torch.set_num_threads(1)
+    open_run(folder, _record(settings, trajectory, how, seed), resume=True)
     rows: list[list[float]] = []
     best: list[Policy] = []
     spent, since = 0.0, time.monotonic()

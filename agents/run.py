@@ -14,6 +14,8 @@ from typing import Any
 from agents.algorithms import AlgorithmSettings
 from agents.files import write_text
 
+RECORD = "run.json"
+"""Name of the file in a run's folder that says what run it is."""
 PACKAGES = ("elbow-gym", "stable-baselines3", "torch", "gymnasium", "numpy", "numba")
 
 
@@ -69,24 +71,40 @@ class Run:
         }
         return json.loads(json.dumps(plain))
 
-    def open(self, resume: bool) -> None:
-        """Writes run.json into a new folder, or checks that the folder's is this run.
 
-        Raises:
-            ValueError: there is a run and it is not resumed, or it had other settings.
-        """
-        path = self.folder / "run.json"
-        if not path.is_file():
-            write_text(path, json.dumps(self.record(), indent=2) + "\n")
-            return
-        if not resume:
-            raise ValueError(f"output must be free of earlier runs, or --resume be given, got {self.folder}")
-        before, now = flat(json.loads(path.read_text(encoding="utf-8"))), flat(self.record())
-        for name in {**before, **now}:
-            if before.get(name) != now.get(name):
-                raise ValueError(
-                    f"{name} of a resumed run must be {before.get(name)!r} as in {path}, got {now.get(name)!r}"
-                )
+def open_run(folder: Path, record: dict[str, Any], resume: bool) -> None:
+    """Writes a run's record into a new folder as run.json, or checks that the folder's is the same.
+
+    Raises:
+        ValueError: as `check_run` does.
+    """
+    check_run(folder, record, resume)
+    if not (folder / RECORD).is_file():
+        write_text(folder / RECORD, json.dumps(record, indent=2) + "\n")
+
+
+def check_run(folder: Path, record: dict[str, Any], resume: bool) -> None:
+    """Checks that a folder is free for a run, or holds the same one and it is resumed.
+
+    Args:
+        folder: the run's.
+        record: what makes the run the run that it is, JSON types only.
+        resume: whether it goes on.
+
+    Raises:
+        ValueError: there is a run and it is not resumed, or it had other settings.
+    """
+    path = folder / RECORD
+    if not path.is_file():
+        return
+    if not resume:
+        raise ValueError(f"output must be free of earlier runs, or --resume be given, got {folder}")
+    before, now = flat(json.loads(path.read_text(encoding="utf-8"))), flat(record)
+    for name in {**before, **now}:
+        if before.get(name) != now.get(name):
+            raise ValueError(
+                f"{name} of a resumed run must be {before.get(name)!r} as in {path}, got {now.get(name)!r}"
+            )
 
 
 def machine() -> str:

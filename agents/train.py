@@ -12,7 +12,7 @@ from typing import Any
 
 from agents.checkpoint import checkpoints, load_checkpoint, load_progress
 from agents.files import write_text
-from agents.run import Run
+from agents.run import Run, open_run
 from agents.sac_settings import SACSettings
 from elbow_gym.settings import Settings
 
@@ -45,7 +45,7 @@ def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
     from agents.metered import MeteredVectorEnv
     from elbow_gym.sb3 import SB3VecEnv
 
-    run.open(resume)
+    open_run(run.folder, run.record(), resume)
     found = checkpoints(run.folder)[-1:]
     progress = load_progress(found[0]) if found else None
     total = run.settings.total_timesteps

@@ -62,3 +62,23 @@ def test_run_of_a_clone_can_be_published_and_loaded(tmp_path, beginning):
         clone_all(SETTINGS, tmp_path / "beginning.npz", SMALL, [5], [folder], "command")
     with pytest.raises(ValueError, match="trajectory must be a file"):
         clone_all(SETTINGS, tmp_path / "nothing.npz", SMALL, [6], [tmp_path / "other"], "command")
+
+
+def test_resumed_clones_leave_finished_seeds_alone(tmp_path, beginning):
+    beginning.save(tmp_path / "beginning.npz")
+    seeds, folders = [5, 6], [tmp_path / "five", tmp_path / "six"]
+
+    def run(how, chosen, resume=True):
+        return clone_all(SETTINGS, tmp_path / "beginning.npz", how, seeds[:chosen], folders[:chosen], "command", resume)
+
+    first = run(SMALL, 1)
+    written = (folders[0] / "best.safetensors").stat().st_mtime_ns
+    folders[1].mkdir()
+    with pytest.raises(ValueError, match=r"settings\.rounds of a resumed run must be 4 .* got 3"):
+        run(replace(SMALL, rounds=3), 2)
+    assert not list(folders[1].iterdir())
+    both = run(SMALL, 2)
+    assert list(both) == seeds
+    assert both[5] == first[5]
+    assert (folders[0] / "best.safetensors").stat().st_mtime_ns == written
+    assert both[6]["best"] != both[5]["best"]
