@@ -11,7 +11,7 @@ from agents.sac_settings import SACSettings
 ALGORITHMS: dict[str, type[AlgorithmSettings]] = {"ppo": PPOSettings, "sac": SACSettings}
 
 _PPO = PPOSettings()
-# An arm that lies on the table cannot fall: a shorter horizon, and noise that narrows further.
+# An arm that leans on the table seldom falls: a shorter horizon, and noise that narrows further.
 _PPO_BRACED = replace(_PPO, gamma=0.97, log_std_final=-4.0)
 # An arm that may fall: a longer horizon, critics that learn for longer before the actor moves, and an actor that moves
 # slowly, at first next to nowhere.
