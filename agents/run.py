@@ -92,10 +92,12 @@ def check_run(folder: Path, record: dict[str, Any], resume: bool) -> None:
         resume: whether it goes on.
 
     Raises:
-        ValueError: there is a run and it is not resumed, or it had other settings.
+        ValueError: there is a run and it is not resumed, it had other settings, or it does not say which.
     """
     path = folder / RECORD
     if not path.is_file():
+        if (folder / "result.json").exists():
+            raise ValueError(f"output must be free of runs without {RECORD}, got {folder}")
         return
     if not resume:
         raise ValueError(f"output must be free of earlier runs, or --resume be given, got {folder}")

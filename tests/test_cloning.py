@@ -82,3 +82,6 @@ def test_resumed_clones_leave_finished_seeds_alone(tmp_path, beginning):
     assert both[5] == first[5]
     assert (folders[0] / "best.safetensors").stat().st_mtime_ns == written
     assert both[6]["best"] != both[5]["best"]
+    (folders[0] / "run.json").unlink()
+    with pytest.raises(ValueError, match=r"free of runs without run\.json"):
+        run(SMALL, 1)
