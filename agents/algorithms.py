@@ -58,7 +58,10 @@ class AlgorithmSettings(ABC):
     """Multiple of the reward's energy weight that the training starts with. Below one the noise on the voltages, which
     costs power, does not end exploration too early; above one the cheap postures are found before the precise ones."""
     energy_share_until: float = 0.5
-    """Share of the training after which the weight, changing linearly, is the reward's own."""
+    """Share of the training after which the weight, changing linearly, stays what it is."""
+    energy_share_final: float = 1.0
+    """Multiple that it ends with. Above one the training gives away some of the return for less energy; evaluations,
+    and with them which policy is the best, count the reward's own weight."""
     evaluate_every: int = 50_000
     """Control periods between two evaluations."""
 
@@ -73,7 +76,8 @@ class AlgorithmSettings(ABC):
 
     def energy_share(self, done: float) -> float:
         """Multiple of the energy weight when this share of the training is done."""
-        return self.first_energy_share + (1.0 - self.first_energy_share) * min(1.0, done / self.energy_share_until)
+        change = self.energy_share_final - self.first_energy_share
+        return self.first_energy_share + change * min(1.0, done / self.energy_share_until)
 
     def follow_plan(self, model: Any, done: float) -> None:
         """Sets what follows a plan, such as how widely the model explores, when this share of the training is done."""

@@ -287,6 +287,8 @@ def test_price_of_power_goes_to_the_rewards_own():
     assert [settings.energy_share(done) for done in (0.0, 0.25, 0.5, 1.0)] == pytest.approx([0.2, 0.6, 1.0, 1.0])
     settings = replace(SMALL, first_energy_share=3.0, energy_share_until=0.8)
     assert [settings.energy_share(done) for done in (0.0, 0.4, 0.8, 1.0)] == pytest.approx([3.0, 2.0, 1.0, 1.0])
+    settings = replace(settings, energy_share_final=1.5)
+    assert [settings.energy_share(done) for done in (0.0, 0.4, 0.8, 1.0)] == pytest.approx([3.0, 2.25, 1.5, 1.5])
     assert SMALL.energy_share(0.0) == 1.0
     with pytest.raises(ValueError, match=r"energy_share_until must lie in \(0, 1\], got 0"):
         replace(SMALL, energy_share_until=0.0)
