@@ -68,6 +68,9 @@ class AlgorithmSettings(ABC):
     def __post_init__(self) -> None:
         if not 0.0 < self.energy_share_until <= 1.0:
             raise ValueError(f"energy_share_until must lie in (0, 1], got {self.energy_share_until}")
+        for name in ("first_energy_share", "energy_share_final"):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"{name} must be at least 0: power must not pay, got {getattr(self, name)}")
 
     @property
     def log_interval(self) -> int:

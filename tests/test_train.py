@@ -282,7 +282,7 @@ def test_staggered_arms_end_their_first_episodes_one_after_the_other():
     assert env.get_state()["episodes"]["steps"].tolist() == [0, *before[1:]]
 
 
-def test_price_of_power_goes_to_the_rewards_own():
+def test_price_of_power_goes_to_the_rewards_own_or_where_it_is_told():
     settings = replace(SMALL, first_energy_share=0.2)
     assert [settings.energy_share(done) for done in (0.0, 0.25, 0.5, 1.0)] == pytest.approx([0.2, 0.6, 1.0, 1.0])
     settings = replace(SMALL, first_energy_share=3.0, energy_share_until=0.8)
@@ -292,6 +292,9 @@ def test_price_of_power_goes_to_the_rewards_own():
     assert SMALL.energy_share(0.0) == 1.0
     with pytest.raises(ValueError, match=r"energy_share_until must lie in \(0, 1\], got 0"):
         replace(SMALL, energy_share_until=0.0)
+    for name in ("first_energy_share", "energy_share_final"):
+        with pytest.raises(ValueError, match=rf"{name} must be at least 0.* got -0.5"):
+            replace(SMALL, **{name: -0.5})
 
 
 def test_exploration_follows_its_plan_whatever_the_gradients_say(tmp_path, monkeypatch):
