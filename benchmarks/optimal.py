@@ -38,28 +38,31 @@ class Cell:
     elbows: int
     start: str = "paper"
     energy_weight: float = DEFAULT_WEIGHT
+    under: bool = False
+    """Whether joints may go under the table with fewer than two elbows, as the environment lets them."""
 
     @property
     def name(self) -> str:
         """Its files' name."""
         target = "_on_target" if self.start == "on_target" else ""
         weight = f"_weight{self.energy_weight:g}" if self.energy_weight != DEFAULT_WEIGHT else ""
-        return f"elbows{self.elbows}{target}{weight}"
+        under = "_under" if self.under else ""
+        return f"elbows{self.elbows}{target}{weight}{under}"
 
     @property
     def problem(self) -> Problem:
         """The default environment from a start without noise; with fewer than two elbows no joint under the table.
 
-        With two elbows the arm lies on the table all the same; with fewer, the space under it is worth much to the
-        reward and nothing to a user.
+        With two elbows the arm lies on the table all the same; with fewer, the space under it is worth nothing to a
+        user. What it is worth to the reward is what the cells with `under` say.
         """
         settings = Settings(elbows=self.elbows, start=self.start, energy_weight=self.energy_weight, start_noise=0.0)
-        return Problem(settings, above_table=self.elbows < 2)
+        return Problem(settings, above_table=self.elbows < 2 and not self.under)
 
     @property
     def parent(self) -> Cell | None:
         """The cell whose solution it starts from, or None."""
-        return Cell(self.elbows, self.start) if self.energy_weight != DEFAULT_WEIGHT else None
+        return Cell(self.elbows, self.start) if self.under or self.energy_weight != DEFAULT_WEIGHT else None
 
     @property
     def question(self) -> dict[str, Any]:
@@ -69,8 +72,9 @@ class Cell:
 
 
 def cells(front: bool = True) -> list[Cell]:
-    """The default reward from both starts, then the front, which starts from its solutions."""
+    """The default reward from both starts; from its solutions the same without the table, and the front."""
     bounds = [Cell(elbows, start) for start in ("paper", "on_target") for elbows in ELBOW_COUNTS]
+    bounds += [Cell(elbows, under=True) for elbows in ELBOW_COUNTS if Cell(elbows).problem.above_table]
     return bounds + [Cell(elbows, "paper", weight) for weight in FRONT_WEIGHTS for elbows in ELBOW_COUNTS if front]
 
 
@@ -96,10 +100,11 @@ def solve_cell(cell: Cell, results: Path) -> str | None:
 
     parent = None if cell.parent is None else files(cell.parent, results)[1]
     try:
+        guesses = {}
         if parent is not None and parent.is_file():
-            guesses = {"default weight": Trajectory.load(parent)}
-        else:
-            guesses = posture_guesses(cell.problem)
+            guesses["above the table" if cell.under else "default weight"] = Trajectory.load(parent)
+        if cell.under or not guesses:
+            guesses |= posture_guesses(cell.problem)
         # The front's cells have the default's mesh, which was refined there.
         found = optimum(cell.problem, guesses, say, refine=cell.energy_weight == DEFAULT_WEIGHT)
     except (SolveError, ValueError, ArithmeticError) as error:
@@ -132,8 +137,10 @@ def write_summary(results: Path, failures: dict[str, str]) -> None:
         status = "solved" if figures else failures.get(cell.name, "not run")
         values = [figures[name] if figures else "" for name in names]
         values = [f"{value:.6g}" if isinstance(value, float) else value for value in values]
-        rows.append([cell.elbows, cell.start, cell.energy_weight, cell.problem.above_table, status, *values])
-    write_csv(results / "optimal.csv", ["elbows", "start", "energy_weight", "above_table", "status", *names], rows)
+        key = [cell.elbows, cell.start, cell.energy_weight, cell.problem.above_table, cell.under]
+        rows.append([*key, status, *values])
+    header = ["elbows", "start", "energy_weight", "above_table", "under", "status", *names]
+    write_csv(results / "optimal.csv", header, rows)
 
 
 def run_cells(todo: Sequence[Cell], results: Path, workers: int) -> dict[str, str]:
@@ -146,7 +153,7 @@ def run_cells(todo: Sequence[Cell], results: Path, workers: int) -> dict[str, st
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     with tqdm(total=len(todo), file=sys.stderr, unit="cell") as bar, ProcessPoolExecutor(workers, context) as pool:
-        # The front starts from the default weight's solution of its elbow count, so it waits for that.
+        # The front and what may go under the table start from the bound of their elbow count, so they wait for that.
         waiting = [cell for cell in todo if cell.parent in todo]
         running = {pool.submit(solve_cell, cell, results): cell for cell in todo if cell not in waiting}
         while running:

@@ -60,7 +60,8 @@ def write_gains(places: Sequence[Mark], path: Path) -> None:
 
 def front(elbows: int) -> list[tuple[float, float]]:
     """Mean tracking error [mm] and energy [J] of the solved cells from the paper's pose, by falling energy."""
-    solved = [cached(cell) for cell in cells() if cell.elbows == elbows and cell.start == "paper"]
+    chosen = [cell for cell in cells() if cell.elbows == elbows and cell.start == "paper" and not cell.under]
+    solved = [cached(cell) for cell in chosen]
     points = [(1e3 * figures["error_mean"], figures["energy"]) for figures in solved if figures]
     return sorted(points)
 

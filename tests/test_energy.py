@@ -14,7 +14,7 @@ from agents.recording import record
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES
 from benchmarks import cache, energy, lineup, pareto
 from benchmarks.lineup import Cell
-from benchmarks.optimal import RESULTS
+from benchmarks.optimal import FRONT_WEIGHTS, RESULTS
 from benchmarks.statistics import interquartile_mean
 from elbow_gym.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
@@ -171,6 +171,13 @@ def test_gain_family_runs_from_soft_to_stiff(tmp_path):
     assert [mark.gain for mark in pareto.gain_family(places, 2)] == [0.25, 1.0, 4.0]
     pareto.write_gains(places, tmp_path / "gains.csv")
     assert len((tmp_path / "gains.csv").read_text().splitlines()) == 4
+
+
+def test_the_front_has_a_point_for_every_price_of_power_and_none_from_under_the_table():
+    for elbows in (2, 1, 0):
+        points = pareto.front(elbows)
+        assert len(points) == 1 + len(FRONT_WEIGHTS)
+        assert np.all(np.diff([energy for _, energy in points]) < 0.0)
 
 
 def test_lqr_stays_within_five_percent_of_the_bound_at_every_elbow_count():

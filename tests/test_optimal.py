@@ -10,7 +10,7 @@ from agents.trajectory import OpenLoop, Trajectory, rollout
 from benchmarks.optimal import Cell, cached, cells, files
 from elbow_gym import Simulator
 from elbow_gym.circle import Circle
-from elbow_gym.kinematics import elbow_heights, inverse_kinematics
+from elbow_gym.kinematics import elbow_heights, inverse_kinematics, joint_positions
 from elbow_gym.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -155,6 +155,14 @@ def test_a_result_of_another_problem_is_not_taken_over(arm, tmp_path):
 def test_cells_have_names_of_their_own():
     names = [cell.name for cell in cells()]
     assert len(set(names)) == len(names)
+
+
+def test_what_may_go_under_the_table_does_and_is_better_for_it(arm):
+    for elbows in (1, 0):
+        held, free = Cell(elbows), Cell(elbows, under=True)
+        lowest = {cell: joint_positions(arm, Trajectory.load(files(cell)[1]).q)[..., 2].min() for cell in (held, free)}
+        assert lowest[free] < -0.1 < -1e-3 < lowest[held]
+        assert cached(free)["closed_loop"] < cached(held)["closed_loop"]
 
 
 @pytest.mark.parametrize("cell", [cell for cell in cells() if cached(cell)], ids=lambda cell: cell.name)

@@ -22,6 +22,7 @@ from agents.report.roster import Entry, roster
 from agents.report.runs import Run, play
 from agents.reproduce import RESULTS, measure, settings_of
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, ELBOW_COLOURS
+from benchmarks import pareto
 from elbow_gym.circle import Circle
 from elbow_gym.kinematics import joint_positions
 
@@ -156,6 +157,14 @@ def test_the_benchmarks_table_is_the_csv(document):
         assert f'data-value="{row["electrical_energy [J]"]}"' in line
         assert f'data-value="{row["return [-]"]}"' in line
         assert (f'data-run="ppo-{row["elbows"]}' in line) == (row["controller"] == "ppo" and row["elbows"] == "2")
+
+
+def test_the_front_is_the_benchmarks_and_nothing_from_under_the_table():
+    shown = payload.front(RESULTS / "optimal.csv")
+    for elbows in (2, 1, 0):
+        mine = [point for point in shown if point["bearing"] == str(elbows) and point["start"] == "paper"]
+        places = sorted((point["error"], point["energy"]) for point in mine)
+        np.testing.assert_allclose(places, pareto.front(elbows), rtol=1e-5)
 
 
 def test_without_results_the_page_says_how_to_make_them(runs, tmp_path):

@@ -117,7 +117,10 @@ def panels(series: Recording) -> list[dict[str, Any]]:
 
 
 def front(path: Path) -> list[dict[str, Any]]:
-    """Solved problems of the bound: elbows, start, energy weight, mean error [mm] and energy [J]; none without file."""
+    """Solved problems of the bound: elbows, start, energy weight, mean error [mm] and energy [J]; none without file.
+
+    What may go under the table is a question of its own and not a point of the front.
+    """
     if not path.is_file():
         return []
     with path.open(newline="", encoding="utf-8") as handle:
@@ -130,5 +133,5 @@ def front(path: Path) -> list[dict[str, Any]]:
                 "energy": float(row["energy"]),
             }
             for row in csv.DictReader(handle)
-            if row["status"] == "solved"
+            if row["status"] == "solved" and row["under"] == "False"
         ]
