@@ -63,6 +63,7 @@ def best_postures(
         ValueError: no search found a posture that meets its conditions.
     """
     from scipy.optimize import minimize
+    from threadpoolctl import threadpool_limits
 
     n, nominal, length = arm.n_joints, np.array(arm.nominal_pose), arm.of_links("length")
     start = circle.position(0.0)
@@ -94,14 +95,16 @@ def best_postures(
     for k in range(starts):
         idle = np.clip(nominal[1:-2] + (rng.normal(scale=SPREAD, size=n - 3) if k else 0.0), -3.0, 3.0)
         guess = np.concatenate([idle, np.tile(nominal[-2:], CIRCLE_POINTS)])
-        best = minimize(
-            lambda angles: float(static_copper_loss(arm, elbows, poses(angles)).mean()),
-            guess,
-            method="SLSQP",
-            constraints=conditions,
-            bounds=[(-np.pi, np.pi)] * guess.size,
-            options={"maxiter": 300, "ftol": 1e-6},
-        )
+        # BLAS adds up in another order on more threads, and where a flat valley's search ends shows it.
+        with threadpool_limits(1, user_api="blas"):
+            best = minimize(
+                lambda angles: float(static_copper_loss(arm, elbows, poses(angles)).mean()),
+                guess,
+                method="SLSQP",
+                constraints=conditions,
+                bounds=[(-np.pi, np.pi)] * guess.size,
+                options={"maxiter": 300, "ftol": 1e-6},
+            )
         met = all((c["fun"](best.x) > -1e-6).all() for c in conditions) and (np.abs(held(best.x)) < 1e-6).all()
         if met:
             pose = inverse_kinematics(arm, poses(best.x)[0], start)[0]

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from agents.classical import COMPUTED, ComputedTorque, GravityPD, Reference, economical_pose
 from agents.evaluate import CLASSICAL
 from agents.metrics import metrics
 from agents.pd import CLIPPED
-from agents.posture import static_copper_loss
+from agents.posture import best_postures, static_copper_loss
 from agents.reference import minimum_jerk
 from agents.trajectory import rollout
 from elbow_gym import Simulator
@@ -98,3 +99,12 @@ def test_controllers_are_independent_of_the_batch():
     together, _ = ComputedTorque(env).predict(observation)
     alone, _ = ComputedTorque(env).predict(observation[1:2])
     np.testing.assert_allclose(together[1:2], alone, atol=1e-4)
+
+
+@pytest.mark.parametrize("elbows", [(), (4,), (4, 7)])
+def test_the_posture_found_depends_on_no_number_of_threads(arm, elbows):
+    found = []
+    for threads in (1, 2):
+        with threadpool_limits(threads, user_api="blas"):
+            found.append(best_postures(arm, elbows, Circle(), starts=1)[0].pose)
+    np.testing.assert_array_equal(*found)
