@@ -43,7 +43,7 @@ def learning(output: Path = RESULTS) -> None:
 
 @app.command
 def optimal(output: Path = RESULTS, fresh: bool = False, workers: int = 2, front: bool = True) -> None:
-    """The best possible return for each elbow count, and the front of energy against tracking error.
+    """The best possible return for each elbow count, the same under the table, and the front of energy against error.
 
     Args:
         output: folder for the results; what was solved there before is kept.

@@ -1,4 +1,4 @@
-"""`python -m benchmarks optimal`: the bound for each elbow count, and the front of energy against tracking error."""
+"""`python -m benchmarks optimal`: the bound for each elbow count, also without the table, and the front around it."""
 
 from __future__ import annotations
 
