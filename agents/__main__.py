@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 import tyro
 
 from agents.cli import run
-from agents.clone_settings import CloneSettings
-from agents.train_command import train_command
+from agents.learning.clone_settings import CloneSettings
+from agents.learning.command import train_command
 
 CLONE = CloneSettings()
 
@@ -28,11 +28,11 @@ def reproduce(output: Path = Path("reproduction"), publish: bool = False, table:
             start poses under three frictions.
     """
     if table:
-        from agents.tabletop_report import reproduce_on_table
+        from agents.paper.table_claims import reproduce_on_table
 
         reproduce_on_table(output, publish=publish)
         return
-    from agents.reproduce import reproduce as reproduce_paper
+    from agents.paper.cases import reproduce as reproduce_paper
 
     reproduce_paper(output, publish=publish)
 
@@ -61,9 +61,9 @@ def clone(
         trajectory: what is cloned; the benchmark's optimum for the elbow count when not given.
         settings: of the imitation.
     """
-    from agents.cloning import clone_all
-    from agents.trajectory import OPTIMA
-    from elbow_gym.settings import Settings
+    from agents.control.trajectory import OPTIMA
+    from agents.learning.clone import clone_all
+    from elbow_gym.task.settings import Settings
 
     chosen = list(range(first_seed, first_seed + seeds))
     folders = [output / f"clone_elbows{elbows}_seed{seed}" for seed in chosen]
@@ -82,7 +82,7 @@ def publish(runs: tyro.conf.Positional[tuple[Path, ...]], /, replace_seeds: bool
         runs: folders of the runs, as the training named them.
         replace_seeds: also remove the shipped seeds of the same algorithm and task that are not among them.
     """
-    from agents.publish import publish as publish_runs
+    from agents.learning.publish import publish as publish_runs
 
     for name in publish_runs(runs, replace_seeds=replace_seeds):
         print(name)
@@ -103,7 +103,7 @@ def evaluate(
     """
     from tqdm import tqdm
 
-    from agents.evaluate import BENCHMARK_SEEDS, in_all_regimes, named_controller, print_results
+    from agents.evaluation.players import BENCHMARK_SEEDS, in_all_regimes, named_controller, print_results
 
     settings, make = named_controller(policy, elbows, env)
     seeds = [BENCHMARK_SEEDS[0] + k for k in range(episodes)]
@@ -154,7 +154,7 @@ def watch(
         size: width and height of each controller's picture in pixels.
         output: a .gif or .mp4 to write instead of opening a window.
     """
-    from agents.watch import watch as watch_controllers
+    from agents.watch.watch import watch as watch_controllers
 
     names = [controller] if versus is None else [controller, versus]
     written = watch_controllers(

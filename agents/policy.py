@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from agents.files import write_text, write_whole
 from agents.tasks import task_name
 from elbow_gym.env import ElbowArmEnv
-from elbow_gym.settings import Settings
-from elbow_gym.task import OBSERVATION_VERSION
+from elbow_gym.task.observation import OBSERVATION_VERSION
+from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 SHIPPED = Path(__file__).parent / "policies"

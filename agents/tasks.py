@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import elbow_gym  # noqa: F401  registers the environments
-from elbow_gym.settings import Settings
+from elbow_gym.task.settings import Settings
 
 ENVIRONMENTS = {"ElbowArm-v0": "elbows", "ElbowArmTable-v0": "table", "ElbowArmRandom-v0": "random"}
 """Ids of the environments and what a task in them is called; the elbow count follows "elbows"."""

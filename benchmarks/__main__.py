@@ -7,7 +7,7 @@ from pathlib import Path
 import tyro
 
 from agents.cli import run
-from benchmarks.energy import RESULTS
+from benchmarks.machine import RESULTS
 
 app = tyro.extras.SubcommandApp()
 
@@ -23,7 +23,7 @@ def energy(output: Path = RESULTS, episodes: int = 20, fresh: bool = False) -> N
         episodes: start poses, one fixed seed each.
         fresh: measure everything again.
     """
-    from benchmarks.energy import energy as measure_energy
+    from benchmarks.energy.run import energy as measure_energy
 
     measure_energy(output, episodes, fresh)
 
@@ -64,7 +64,7 @@ def speed(output: Path = RESULTS, quick: bool = False) -> None:
         output: folder for the results.
         quick: few and short samples, to see that all works.
     """
-    from benchmarks.speed import speed as measure_speed
+    from benchmarks.speed.run import speed as measure_speed
 
     measure_speed(output, quick)
 

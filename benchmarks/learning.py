@@ -15,7 +15,8 @@ from scipy import stats
 from agents.files import write_csv, write_text, write_whole
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES, ELBOW_NAMES, pyplot
 from agents.tasks import POLICY_NAME
-from benchmarks.optimal import RESULTS, Cell, cached
+from benchmarks.machine import RESULTS
+from benchmarks.optimal import Cell, cached
 
 Array = NDArray[np.float64]
 
@@ -41,7 +42,7 @@ class Curve:
     task: str
     seed: int
     columns: Mapping[str, Array]
-    """By name as in `agents.keeper.COLUMNS`, (evaluations,)."""
+    """By name as in `agents.learning.callback.COLUMNS`, (evaluations,)."""
 
     def beats(self, goal: Goal) -> dict[str, float] | None:
         """Steps and seconds at the first evaluation that is below both figures of the PD; None when none is."""

@@ -15,14 +15,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from agents.control.trajectory import Trajectory
 from agents.files import write_csv, write_text
-from agents.optimal import Optimum, SolveError, optimum, posture_guesses
-from agents.trajectory import Trajectory
-from agents.transcription import Problem
-from benchmarks.context import machine, versions
-from elbow_gym.settings import Settings
+from agents.optimal.bound import Optimum, SolveError, optimum, posture_guesses
+from agents.optimal.collocation import Problem
+from benchmarks.machine import RESULTS, machine, versions
+from elbow_gym.task.settings import Settings
 
-RESULTS = Path(__file__).parent / "results"
 FOLDER = "optimal"
 DEFAULT_WEIGHT = 0.001
 FRONT_WEIGHTS = (0.0002, 0.002, 0.005)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 from gymnasium.envs.registration import register  # pyright: ignore[reportUnknownVariableType]
 
 if TYPE_CHECKING:
-    from elbow_gym.circle import Circle
     from elbow_gym.env import ElbowArmEnv
     from elbow_gym.multi_objective import MOElbowArmEnv
     from elbow_gym.parameters import ArmParameters, LinkParameters, MotorParameters, paper_arm
     from elbow_gym.simulator import Simulator
     from elbow_gym.table import TableParameters
+    from elbow_gym.task.circle import Circle
     from elbow_gym.vector_env import ElbowArmVectorEnv
 
 __version__ = "0.1.0"
@@ -21,7 +21,7 @@ __version__ = "0.1.0"
 # Names are imported when first asked for, so that `import elbow_gym` loads no compiler.
 _HOMES = {
     "ArmParameters": "parameters",
-    "Circle": "circle",
+    "Circle": "task.circle",
     "ElbowArmEnv": "env",
     "ElbowArmVectorEnv": "vector_env",
     "LinkParameters": "parameters",

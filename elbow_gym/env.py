@@ -11,10 +11,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from elbow_gym.episodes import Episodes
 from elbow_gym.parameters import ArmParameters, Array, non_negative
-from elbow_gym.settings import Settings
-from elbow_gym.viewer import RENDER_MODES, Viewer
+from elbow_gym.rendering.viewer import RENDER_MODES, Viewer
+from elbow_gym.task.episodes import Episodes
+from elbow_gym.task.settings import Settings
 
 
 def action_space(episodes: Episodes) -> spaces.Space[NDArray[np.float32]]:
@@ -119,7 +119,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | heat | False | whether windings warm up, and their resistance with them |
     | supply_resistance | 0.0 | inside the motors' common supply [ohm] |
     | payload | 0.0 | mass at the hand [kg] |
-    | randomize | None | dict of ranges drawn anew at each reset, see `elbow_gym.randomization` |
+    | randomize | None | dict of ranges drawn anew at each reset, see `elbow_gym.task.randomization` |
 
     Beside them `render_mode` ("rgb_array" or "human", None by default), `render_width` (640) and `render_height` (480)
     choose the picture.

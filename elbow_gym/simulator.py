@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from elbow_gym import kernel
-from elbow_gym.conditions import Conditions
 from elbow_gym.kinematics import elbow_heights, pitches
 from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows, positive
-from elbow_gym.readings import Readings
-from elbow_gym.sharing import Sharing
-from elbow_gym.tables import as_batch, parameter_table
+from elbow_gym.simulation.options import Conditions
+from elbow_gym.simulation.parameter_rows import as_batch, parameter_table
+from elbow_gym.simulation.state_views import Readings
+from elbow_gym.simulation.thread_pool import Sharing
 
 # A given pose may be off the elbows' plane by this much [m], its rates by this much [m/s].
 PLANE_TOLERANCE = 1e-8

@@ -13,10 +13,10 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from elbow_gym.env import ElbowArmEnv, action_space, as_action, observation_space
-from elbow_gym.episodes import Episodes
 from elbow_gym.parameters import ArmParameters, Array, non_negative
-from elbow_gym.settings import Settings
-from elbow_gym.viewer import Viewer
+from elbow_gym.rendering.viewer import Viewer
+from elbow_gym.task.episodes import Episodes
+from elbow_gym.task.settings import Settings
 
 Flags = NDArray[np.bool_]
 

@@ -5,10 +5,10 @@ import csv
 import numpy as np
 import pytest
 
-from agents.posture import static_copper_loss
-from benchmarks import breakdown
-from benchmarks.energy import RESULTS
-from elbow_gym.settings import Settings
+from agents.control.posture import static_copper_loss
+from benchmarks.energy import breakdown
+from benchmarks.machine import RESULTS
+from elbow_gym.task.settings import Settings
 
 
 def test_parts_sum_to_the_whole_joint_by_joint():

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from elbow_gym.camera import ELEVATION, framing
+from elbow_gym.rendering.camera import ELEVATION, framing
 
 FRAME = (30.0, 50.0, 500.0, 300.0)
 POINTS = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.4], [1.0, 1.5, 0.1], [0.3, -0.2, 0.5]])

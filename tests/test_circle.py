@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elbow_gym import ArmParameters, Circle, LinkParameters, MotorParameters, paper_arm
-from elbow_gym.circle import as_circle, as_phase, check_reachable, reach_shortfall
+from elbow_gym.task.circle import as_circle, as_phase, check_reachable, reach_shortfall
 
 CENTER = np.array([1.5, 1.5, 0.4])
 OUTWARD = np.array([1.0, 1.0, 0.0]) / math.sqrt(2.0)

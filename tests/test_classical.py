@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from agents.classical import COMPUTED, ComputedTorque, GravityPD, Reference, economical_pose
-from agents.evaluate import CLASSICAL
-from agents.metrics import metrics
-from agents.pd import CLIPPED
-from agents.posture import best_postures, static_copper_loss
-from agents.reference import minimum_jerk
-from agents.trajectory import rollout
+from agents.control.classical import COMPUTED, ComputedTorque, GravityPD, Reference, economical_pose
+from agents.control.minimum_jerk import minimum_jerk
+from agents.control.pd import CLIPPED
+from agents.control.posture import best_postures, static_copper_loss
+from agents.evaluation.metrics import metrics
+from agents.evaluation.players import CLASSICAL
+from agents.optimal.bound import rollout
 from elbow_gym import Simulator
-from elbow_gym.circle import Circle
 from elbow_gym.kinematics import hand_position, inverse_kinematics, joint_positions
-from elbow_gym.settings import Settings
+from elbow_gym.task.circle import Circle
+from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.clone_settings import CloneSettings
-from agents.cloning import clone, clone_all
-from agents.keeper import evaluation
-from agents.lqr import TimeVaryingLQR
+from agents.control.lqr import TimeVaryingLQR
+from agents.control.trajectory import OPTIMA, Trajectory
+from agents.learning.clone import clone, clone_all
+from agents.learning.clone_settings import CloneSettings
+from agents.learning.evaluation import evaluation
+from agents.learning.publish import publish
 from agents.policy import load_policy
-from agents.publish import publish
-from agents.trajectory import OPTIMA, Trajectory
-from elbow_gym.settings import Settings
+from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 PERIODS = 15

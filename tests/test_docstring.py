@@ -9,8 +9,8 @@ import pytest
 
 from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv
 from elbow_gym.kinematics import elbow_heights
-from elbow_gym.settings import Settings
-from elbow_gym.task import FEATURES, SWITCHED_FEATURES, ObservationLayout
+from elbow_gym.task.observation import FEATURES, SWITCHED_FEATURES, ObservationLayout
+from elbow_gym.task.settings import Settings
 
 PAGE = inspect.getdoc(ElbowArmEnv)
 

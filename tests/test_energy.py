@@ -7,16 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.evaluate import SHIFTED
-from agents.metrics import REGIMES, UNITS
-from agents.pd import CLIPPED, PDController
-from agents.recording import record
+from agents.control.pd import CLIPPED, PDController
+from agents.evaluation.metrics import REGIMES, UNITS
+from agents.evaluation.players import SHIFTED
+from agents.evaluation.recording import record
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES
-from benchmarks import cache, energy, lineup, pareto
-from benchmarks.lineup import Cell
-from benchmarks.optimal import FRONT_WEIGHTS, RESULTS
-from benchmarks.statistics import interquartile_mean
-from elbow_gym.settings import Settings
+from benchmarks.energy import cache, pareto
+from benchmarks.energy import cells as lineup
+from benchmarks.energy import run as energy
+from benchmarks.energy.cells import Cell
+from benchmarks.energy.statistics import interquartile_mean
+from benchmarks.machine import RESULTS
+from benchmarks.optimal import FRONT_WEIGHTS
+from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 STYLES = (CONTROLLER_COLOURS, CONTROLLER_NAMES, CONTROLLER_MARKERS)

@@ -6,8 +6,8 @@ from strategies import between, cases
 from test_kernel import accelerations, states
 
 from elbow_gym import LinkParameters, dynamics
-from elbow_gym.conditions import Conditions
-from elbow_gym.tables import parameter_table
+from elbow_gym.simulation.options import Conditions
+from elbow_gym.simulation.parameter_rows import parameter_table
 
 # Where the linear systems are worse conditioned than this, rounding alone exceeds the tolerance.
 WORST_CONDITION = 1e7

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from agents.foresight import AHEAD, GAIN, VELOCITY_SCALE, Foresight, Sharpened
+from agents.learning.sac.inputs import AHEAD, GAIN, VELOCITY_SCALE, Foresight, Sharpened
 from elbow_gym.kinematics import hand_position
 from elbow_gym.parameters import paper_arm
 from elbow_gym.vector_env import ElbowArmVectorEnv

@@ -6,7 +6,7 @@ from hypothesis import given
 from strategies import cases
 from test_equivalence import assert_close, fast
 
-from agents.inverse_dynamics import InverseDynamics
+from agents.control.inverse_dynamics import InverseDynamics
 from elbow_gym import Simulator, dynamics, kinematics
 
 ELBOWS = [(), (4,), (4, 7)]

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from elbow_gym import kernel, kinematics, paper_arm
-from elbow_gym.conditions import Conditions
-from elbow_gym.tables import parameter_table
+from elbow_gym.simulation.options import Conditions
+from elbow_gym.simulation.parameter_rows import parameter_table
 
 HERE = Path(__file__).parent
 VECTORS = np.load(HERE / "vectors" / "forward_dynamics_vectors.npz")

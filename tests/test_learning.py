@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from agents.keeper import COLUMNS, write_evaluations
+from agents.learning.evaluation import COLUMNS, write_evaluations
 from benchmarks import learning
 from benchmarks.learning import Curve, Goal
 

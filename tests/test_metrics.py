@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from agents.metrics import REGIMES, UNITS, joint_energies, metrics
-from agents.pd import PDController
-from agents.recording import Recording, record
-from elbow_gym.settings import Settings
+from agents.control.pd import PDController
+from agents.evaluation.metrics import REGIMES, UNITS, joint_energies, metrics
+from agents.evaluation.recording import Recording, record
+from elbow_gym.task.settings import Settings
 
 
 def hand_made(energy_weight=0.001):

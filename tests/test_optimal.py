@@ -5,13 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from agents.lqr import TimeVaryingLQR, linearised_periods, lqr_gains
-from agents.trajectory import OpenLoop, Trajectory, rollout
+from agents.control.lqr import TimeVaryingLQR, linearised_periods, lqr_gains
+from agents.control.trajectory import OpenLoop, Trajectory
+from agents.optimal.bound import rollout
 from benchmarks.optimal import Cell, cached, cells, files
 from elbow_gym import Simulator
-from elbow_gym.circle import Circle
 from elbow_gym.kinematics import elbow_heights, inverse_kinematics, joint_positions
-from elbow_gym.settings import Settings
+from elbow_gym.task.circle import Circle
+from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 
@@ -70,8 +71,8 @@ def test_lqr_gains_after_the_last_period_only_weigh_the_last_cost(arm):
 def short():
     """0.1 s from the target with two elbows, and its solution."""
     pytest.importorskip("casadi")
-    from agents.optimal import solve
-    from agents.transcription import Problem, Transcription
+    from agents.optimal.bound import solve
+    from agents.optimal.collocation import Problem, Transcription
 
     settings = Settings(start="on_target", duration=0.1, start_noise=0.0)
     program = Transcription(Problem(settings), 2)
@@ -124,7 +125,7 @@ def test_simulator_reaches_the_predicted_cost_open_loop_and_under_the_lqr(short)
 
 
 def test_a_warm_start_stays_where_the_last_solve_has_come(short):
-    from agents.optimal import variables
+    from agents.optimal.bound import variables
 
     program, solution = short
     x, multipliers, _ = program.solve(variables(program, solution.trajectory), 0.003)
@@ -134,7 +135,7 @@ def test_a_warm_start_stays_where_the_last_solve_has_come(short):
 
 
 def test_an_impossible_problem_is_said_to_have_failed(short):
-    from agents.optimal import SolveError, solve
+    from agents.optimal.bound import SolveError, solve
 
     program, solution = short
     with pytest.raises(SolveError, match=r"IPOPT must converge at a smoothing of 0\.03 m, got Maximum_Iterations"):

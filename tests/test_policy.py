@@ -9,12 +9,12 @@ import torch
 from stable_baselines3 import PPO
 
 import agents.policy as policies
+from agents.learning.sac.settings import SACSettings
 from agents.policy import Policy, load_policy, policy_of, shipped_policies
-from agents.sac_settings import SACSettings
 from agents.tasks import task_name
 from elbow_gym.env import ElbowArmEnv
 from elbow_gym.sb3 import SB3VecEnv
-from elbow_gym.settings import Settings
+from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 
@@ -167,7 +167,7 @@ def test_best_seed_is_loaded_unless_one_is_given(policy, tmp_path, monkeypatch):
 
 
 def test_shipped_two_elbow_policy_holds_its_promise():
-    from agents.keeper import evaluation
+    from agents.learning.evaluation import evaluation
 
     policy = load_policy("ppo", elbows=2)
     figures = evaluation(policy, policy.settings)

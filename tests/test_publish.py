@@ -5,8 +5,8 @@ import shutil
 
 import pytest
 
+from agents.learning.publish import publish
 from agents.policy import SHIPPED, load_policy, pair
-from agents.publish import publish
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def test_unfinished_misnamed_and_large_runs_are_refused(run, tmp_path, monkeypat
     with pytest.raises(ValueError, match="runs must be finished trainings, got"):
         publish([run], **places(tmp_path))
     (run / "result.json").write_text(json.dumps({"finished": True}))
-    monkeypatch.setattr("agents.publish.LARGEST", 1000)
+    monkeypatch.setattr("agents.learning.publish.LARGEST", 1000)
     with pytest.raises(ValueError, match="a policy must have at most 1000 bytes, got"):
         publish([run], **places(tmp_path))
     wrong = run.rename(run.with_name("ppo_elbows1_seed0"))

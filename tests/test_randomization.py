@@ -5,9 +5,9 @@ import pytest
 from test_kernel import accelerations, states
 
 from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, dynamics, paper_arm
-from elbow_gym.conditions import Conditions
-from elbow_gym.population import Population
-from elbow_gym.randomization import FACTORS, Randomization
+from elbow_gym.simulation.options import Conditions
+from elbow_gym.task.arm_batch import Population
+from elbow_gym.task.randomization import FACTORS, Randomization
 
 EVERYTHING = {
     **{name: [0.9, 1.1] for name in FACTORS},

@@ -11,11 +11,11 @@ from make_golden import GOLDEN, picture
 from PIL import Image
 
 from elbow_gym import ElbowArmEnv, paper_arm
-from elbow_gym.circle import Circle
-from elbow_gym.drawing import ELBOW, INK, PULL, PUSH, TRACE
 from elbow_gym.kinematics import joint_positions
-from elbow_gym.rendering import cut_at_table
-from elbow_gym.viewer import Viewer
+from elbow_gym.rendering.painter import ELBOW, INK, PULL, PUSH, TRACE
+from elbow_gym.rendering.scene import cut_at_table
+from elbow_gym.rendering.viewer import Viewer
+from elbow_gym.task.circle import Circle
 
 SIZES = [(640, 480), (1280, 720), (320, 240)]
 

@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 from browser import chromium, emulate, keep_picture
 
-from agents.evaluate import CLASSICAL
-from agents.figures import write_series
-from agents.metrics import metrics
-from agents.recording import Recording
+from agents.evaluation.metrics import metrics
+from agents.evaluation.players import CLASSICAL
+from agents.evaluation.recording import Recording
+from agents.paper.cases import RESULTS, measure, settings_of
+from agents.paper.figures import write_series
 from agents.report import colours, command, payload
 from agents.report import roster as lineup
 from agents.report.page import page
 from agents.report.roster import Entry, roster
 from agents.report.runs import Run, play
-from agents.reproduce import RESULTS, measure, settings_of
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, ELBOW_COLOURS
-from benchmarks import pareto
-from elbow_gym.circle import Circle
+from benchmarks.energy import pareto
 from elbow_gym.kinematics import joint_positions
+from elbow_gym.task.circle import Circle
 
 
 def synthetic(elbows, start):

@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import reproduce, verdict
-from agents.pd import PAPER_KD, PAPER_KP
-from agents.recording import Recording
+from agents.control.pd import PAPER_KD, PAPER_KP
+from agents.evaluation.recording import Recording
+from agents.paper import cases as reproduce
+from agents.paper import claims as verdict
 from agents.style import ELBOW_COLOURS
 from elbow_gym import Simulator
-from elbow_gym.circle import Circle
 from elbow_gym.kinematics import inverse_kinematics
+from elbow_gym.task.circle import Circle
 
 # shared/design/physics.md, "Numbers that any right implementation gives", by elbow count.
 TABLE = {

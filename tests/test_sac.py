@@ -12,9 +12,9 @@ from gymnasium.spaces import Box
 from gymnasium.wrappers import TimeLimit
 from stable_baselines3.common.logger import configure
 
-from agents.critic import QuadraticCritics
-from agents.foresight import Sharpened
-from agents.sac import SAC, Batch, CentredPolicy
+from agents.learning.sac.agent import SAC, Batch, CentredPolicy
+from agents.learning.sac.critic import QuadraticCritics
+from agents.learning.sac.inputs import Sharpened
 
 
 def small(env=None, **arguments):

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from elbow_gym import Circle, paper_arm
-from elbow_gym.settings import Settings
+from elbow_gym.task.settings import Settings
 
 POSITIVE = ("control_frequency", "timestep", "duration", "voltage_limit")
 NON_NEGATIVE = ("start_noise", "tracking_weight", "energy_weight")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from elbow_gym import Simulator
-from elbow_gym.sharing import Sharing
+from elbow_gym.simulation.thread_pool import Sharing
 
 
 @pytest.mark.parametrize(("arms", "lanes", "threads"), [(1, 1, 1), (5, 1, 3), (16, 16, 4), (40, 16, 2), (100, 16, 3)])

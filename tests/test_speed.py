@@ -10,7 +10,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from benchmarks import contenders, environments, peers, speed
+from benchmarks.speed import environments, peers
+from benchmarks.speed import own as contenders
+from benchmarks.speed import run as speed
 from elbow_gym import Simulator
 from elbow_gym.dynamics import forward_dynamics
 

@@ -11,9 +11,9 @@ from test_equivalence import assert_close, assume_solvable
 from test_kernel import accelerations
 
 from elbow_gym import dynamics, kernel, motors
-from elbow_gym.conditions import Conditions
+from elbow_gym.simulation.options import Conditions
+from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.table import FRICTION_VELOCITY, TableParameters
-from elbow_gym.tables import parameter_table
 
 SWITCHES = [
     {"table": True},

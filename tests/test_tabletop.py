@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import tabletop_report
-from agents.reproduce import settings_of
-from agents.tabletop import FRICTIONS, LIFTS, TableNumbers, play_on_table, start_pose
-from agents.tabletop_figure import COLOURS
+from agents.paper import table_claims as tabletop_report
+from agents.paper.cases import settings_of
+from agents.paper.table_cases import FRICTIONS, LIFTS, TableNumbers, play_on_table, start_pose
+from agents.paper.table_figure import COLOURS
 from elbow_gym.kinematics import hand_position, joint_positions
 from elbow_gym.table import FRICTION_VELOCITY
 

@@ -4,8 +4,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from elbow_gym import Circle, Simulator, paper_arm, task
+from elbow_gym import Circle, Simulator, paper_arm
 from elbow_gym.kinematics import hand_position
+from elbow_gym.task import observation as task
 
 ARM = paper_arm()
 CIRCLE = Circle(plane="radial", radius=0.2, period=4.0)

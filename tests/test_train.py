@@ -13,15 +13,16 @@ import numpy as np
 import pytest
 from stable_baselines3 import PPO
 
-from agents.checkpoint import checkpoints
-from agents.keeper import COLUMNS, Keeper
-from agents.metered import MeteredVectorEnv
+from agents.learning.callback import Keeper
+from agents.learning.checkpoint import checkpoints
+from agents.learning.evaluation import COLUMNS
+from agents.learning.ppo import PPOSettings
+from agents.learning.run_folder import Run
+from agents.learning.sac.settings import SACSettings
+from agents.learning.train import train, train_all
+from agents.learning.training_env import MeteredVectorEnv
 from agents.policy import load_policy
-from agents.ppo_settings import PPOSettings
-from agents.run import Run
-from agents.sac_settings import SACSettings
-from agents.train import train, train_all
-from elbow_gym.settings import Settings
+from elbow_gym.task.settings import Settings
 
 SMALL = PPOSettings(
     total_timesteps=1024, num_envs=4, n_steps=64, batch_size=64, n_epochs=1, hidden=(8,), evaluate_every=256
@@ -88,8 +89,8 @@ def test_card_tells_how_it_was_made(done):
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from agents.keeper import Keeper
-from agents.train import train
+from agents.learning.callback import Keeper
+from agents.learning.train import train
 from tests.test_train import SAC_KILLED, small_run
 
 def die(self):
@@ -139,7 +140,7 @@ def test_interrupted_run_keeps_its_best_policy_and_goes_on(tmp_path, monkeypatch
 
 
 def test_finished_run_is_left_alone(done, monkeypatch):
-    monkeypatch.setattr("agents.keeper.Keeper", None)
+    monkeypatch.setattr("agents.learning.callback.Keeper", None)
     assert train(done[0], resume=True) == done[1]
 
 
@@ -219,8 +220,8 @@ def test_killed_sac_goes_on_to_the_same_policy(tmp_path):
 def test_sac_checkpoint_holds_the_replay_buffer(tmp_path):
     from stable_baselines3.common.vec_env import VecMonitor
 
-    from agents.checkpoint import load_checkpoint
-    from agents.metered import MeteredVectorEnv
+    from agents.learning.checkpoint import load_checkpoint
+    from agents.learning.training_env import MeteredVectorEnv
     from elbow_gym.sb3 import SB3VecEnv
 
     run = small_run(tmp_path / "run", algorithm="sac", settings=SAC_SMALL)
@@ -240,8 +241,8 @@ def test_sac_checkpoint_holds_the_replay_buffer(tmp_path):
 def test_warm_start_shows_how_the_task_is_done(tmp_path):
     from stable_baselines3.common.vec_env import VecMonitor
 
-    from agents.metered import MeteredVectorEnv
-    from agents.warm_start import fill, imitate
+    from agents.learning.training_env import MeteredVectorEnv
+    from agents.learning.warm_start import fill, imitate
     from elbow_gym.sb3 import SB3VecEnv
 
     sac = replace(SAC_SMALL, learning_starts=1000, warm_start_noise=0.05)

@@ -16,8 +16,8 @@ from imageio_ffmpeg import count_frames_and_secs
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv
-from elbow_gym.screen import Window
-from elbow_gym.viewer import RENDER_MODES, Viewer
+from elbow_gym.rendering.screen import Window
+from elbow_gym.rendering.viewer import RENDER_MODES, Viewer
 
 SMALL = {"render_width": 160, "render_height": 120}
 ACTIONS = np.random.default_rng(2).uniform(-1.0, 1.0, (12, 10)).astype(np.float32)

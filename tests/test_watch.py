@@ -7,13 +7,13 @@ import pytest
 from imageio_ffmpeg import count_frames_and_secs, read_frames
 from PIL import Image
 
-from agents import watch as watching
 from agents.__main__ import app
-from agents.evaluate import named_controller
+from agents.evaluation.players import named_controller
 from agents.style import CONTROLLER_COLOURS
-from agents.video import write_video
-from agents.watch import Performance, frames, label, style_of, watch
-from elbow_gym.screen import Window
+from agents.watch import watch as watching
+from agents.watch.video import write_video
+from agents.watch.watch import Performance, frames, label, style_of, watch
+from elbow_gym.rendering.screen import Window
 
 SIZE = (160, 120)
 LABELLED = 120 + round(30.0 * 0.25)

@@ -6,10 +6,10 @@ import sys
 from pathlib import Path
 
 from agents.files import write_text
+from agents.paper.cases import RESULTS
 from agents.report.page import page
 from agents.report.roster import roster
 from agents.report.runs import collect
-from agents.reproduce import RESULTS
 
 
 def report(output: Path, results: Path = RESULTS) -> Path:

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.figures import CASES, SETTLED, VIEWS
-from agents.metrics import REGIMES
-from agents.recording import Recording
+from agents.evaluation.metrics import REGIMES
+from agents.evaluation.recording import Recording
+from agents.paper.figures import CASES, SETTLED, VIEWS
 from agents.report.roster import TABLE
 from agents.report.runs import Run
 from agents.style import CONTROLLER_MARKERS, CONTROLLER_NAMES, ELBOW_NAMES

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from agents.controller import EFFORT, Controller
-from agents.evaluate import CLASSICAL, named_controller
-from agents.figures import CASES
-from agents.lqr import TimeVaryingLQR
+from agents.control.controller import EFFORT, Controller
+from agents.control.lqr import TimeVaryingLQR
+from agents.control.trajectory import Trajectory
+from agents.evaluation.players import CLASSICAL, named_controller
+from agents.paper.figures import CASES
 from agents.policy import shipped_policies
 from agents.tasks import POLICY_NAME
-from agents.trajectory import Trajectory
-from elbow_gym.settings import STARTS, Settings
+from elbow_gym.task.settings import STARTS, Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 SHOWN_AS = {"pd": "pd_24v"}
@@ -28,7 +28,7 @@ class Entry:
     """A controller in one environment; its runs from all starts are one job."""
 
     name: str
-    """As `agents.evaluate.named_controller` knows it, or "lqr"."""
+    """As `agents.evaluation.players.named_controller` knows it, or "lqr"."""
     elbows: int
     """On the rigid table."""
     results: Path

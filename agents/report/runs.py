@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from agents.evaluate import RECORDING_PERIOD
-from agents.figures import SERIES_PERIOD, thinned
-from agents.metrics import REGIMES, metrics
-from agents.recording import Recording, record
+from agents.evaluation.metrics import REGIMES, metrics
+from agents.evaluation.players import RECORDING_PERIOD
+from agents.evaluation.recording import Recording, record, thinned
+from agents.paper.cases import RECORD_PERIOD, measure
+from agents.paper.figures import SERIES_PERIOD
 from agents.report.roster import TABLE, Entry
-from agents.reproduce import RECORD_PERIOD, measure
 from agents.workers import Job, in_processes
-from elbow_gym.settings import STARTS
+from elbow_gym.task.settings import STARTS
 
 PAPER_PD = ("pd_paper", "pd")
-"""Whose runs give the paper's numbers (`agents.reproduce.RUNS`)."""
+"""Whose runs give the paper's numbers (`agents.paper.cases.RUNS`)."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class Run:
     series: Recording
     """Every `SERIES_PERIOD`, or every control period where that is longer."""
     figures: Mapping[str, Mapping[str, float]]
-    """Metrics (`agents.metrics.UNITS`) by regime, of the regimes with this start."""
+    """Metrics (`agents.evaluation.metrics.UNITS`) by regime, of the regimes with this start."""
     measured: Mapping[str, Any] | None = None
-    """What `agents.reproduce.measure` found: of the paper's PD alone."""
+    """What `agents.paper.cases.measure` found: of the paper's PD alone."""
 
     @property
     def key(self) -> str:

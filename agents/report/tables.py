@@ -8,19 +8,19 @@ from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
-from agents.figures import CASES
+from agents.paper.cases import case_numbers, quantities
+from agents.paper.claims import Numbers, disclosures, verdict
+from agents.paper.figures import CASES
 from agents.report.payload import BEARINGS
 from agents.report.roster import TABLE
 from agents.report.runs import Run
-from agents.reproduce import case_numbers, quantities
 from agents.style import CONTROLLER_NAMES, ELBOW_NAMES
-from agents.verdict import Numbers, disclosures, verdict
 
 PARTS = {"nominal": "energy", "shifted": "energy_shifted", TABLE: "energy_table"}
 """Parts of the benchmark and the files of their results."""
 LEARNED = ("ppo", "sac")
 PAPER_RUNS = {"paper": ("pd_paper", "paper"), "on target": ("pd_paper", "on_target"), "24 V": ("pd_24v", "paper")}
-"""Controller and start of `agents.reproduce.RUNS`."""
+"""Controller and start of `agents.paper.cases.RUNS`."""
 
 
 class Column(NamedTuple):

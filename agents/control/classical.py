@@ -1,0 +1,170 @@
+"""A good engineer's controllers: smooth references, gravity feed-forward and computed torque, in volts.
+
+All start from where the arm stands and blend over to the pose that has the hand on the target. They count the time
+since the start by their own calls: make one controller per episode, and let all arms of a batch start together.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.control.inverse_dynamics import InverseDynamics
+from agents.control.minimum_jerk import minimum_jerk
+from agents.control.pd import PAPER_KD, PAPER_KP
+from agents.control.posture import best_postures
+from elbow_gym.env import ElbowArmEnv
+from elbow_gym.kinematics import inverse_kinematics
+from elbow_gym.parameters import ArmParameters, positive
+from elbow_gym.task.circle import Circle
+from elbow_gym.vector_env import ElbowArmVectorEnv
+
+Array = NDArray[np.float64]
+Env = ElbowArmEnv | ElbowArmVectorEnv
+
+COMPUTED: dict[str, Any] = {
+    "control_frequency": 500.0,
+    "timestep": 0.002,
+    "voltage_limit": 24.0,
+    "action_unit": "volt",
+}
+"""Arguments of the environment that computed torque acts in; the PD variants act in the PD's."""
+REACH_TIME = 0.7
+"""From the start pose to the target [s]: with less, the yaw would want more than 24 V."""
+BANDWIDTH = 15.0
+"""Both poles of computed torque's tracking error [rad/s]."""
+ANGLE_STEP = 1e-4
+"""Half the difference by which the reference's rates become accelerations [rad of the circle]."""
+
+
+class Motion(NamedTuple):
+    """A pose and its first two derivatives, each (..., n) in rad, rad/s and rad/s^2."""
+
+    q: Array
+    q_dot: Array
+    q_ddot: Array
+
+
+class Reference:
+    """Minimum-jerk blend from the pose seen first to the pose q_d of joints 1, n-1 and n on the target (eq. 29).
+
+    Args:
+        env: the environment that the arm acts in.
+        pose: what joints 2..n-2 end in [rad], (n,); the start pose when None.
+        reach_time: from the start to the target [s].
+    """
+
+    def __init__(self, env: Env, pose: ArrayLike | None, reach_time: float) -> None:
+        episodes = env.unwrapped.episodes
+        self._arm, self._circle = episodes.arm, episodes.targets if episodes.circle.random else episodes.circle
+        self._pose = episodes.pose if pose is None else np.asarray(pose, dtype=np.float64)
+        self._period, self._reach_time = episodes.settings.control_period, positive("reach_time", reach_time)
+        self._start: Array | None = None
+        self._calls = 0
+
+    def _desired(self, angle: Array) -> tuple[Array, Array]:
+        return inverse_kinematics(self._arm, self._pose, self._circle.position(angle), self._circle.velocity(angle))
+
+    def next(self, angle: Array, q: Array) -> Motion:
+        """The motion now, at the target's angle on the circle [rad], (...), with the arm at q [rad], (..., n)."""
+        if self._start is None:
+            self._start = q
+        rate = np.asarray(self._circle.rate)[..., None]
+        q_d, q_d_dot = self._desired(angle)
+        q_d_ddot = (self._desired(angle + ANGLE_STEP)[1] - self._desired(angle - ANGLE_STEP)[1]) * (
+            rate / (2.0 * ANGLE_STEP)
+        )
+        blend, slope, curvature = minimum_jerk(self._calls * self._period / self._reach_time)
+        slope, curvature = slope / self._reach_time, curvature / self._reach_time**2
+        self._calls += 1
+        way = q_d - self._start
+        return Motion(
+            self._start + blend * way,
+            slope * way + blend * q_d_dot,
+            curvature * way + 2.0 * slope * q_d_dot + blend * q_d_ddot,
+        )
+
+
+class _Following(ABC):
+    """What the controllers below share: they see the state, follow a reference and give clipped actions."""
+
+    def __init__(self, env: Env, pose: ArrayLike | None = None, reach_time: float = REACH_TIME) -> None:
+        episodes = env.unwrapped.episodes
+        self._layout, self._zero = episodes.layout, episodes.pose
+        self._volts, self._highest = episodes.volts_per_action, episodes.highest_action
+        self._period = episodes.settings.control_period
+        self._inverse = InverseDynamics(episodes.arm, episodes.settings.elbow_joints)
+        self._reference = Reference(env, pose, reach_time)
+
+    def predict(
+        self, observation: NDArray[np.float32], *_args: Any, **_kwargs: Any
+    ) -> tuple[NDArray[np.float32], None]:
+        """Actions (..., n) for observations (..., size); the first call is the episode's start."""
+        seen = self._layout.decode(observation)
+        q = seen["joint_angle"] + self._zero
+        wanted = self._reference.next(np.arctan2(seen["target_angle"][..., 1], seen["target_angle"][..., 0]), q)
+        voltage = self._voltage(wanted, q, seen["joint_velocity"], seen["current"])
+        return np.clip(voltage / self._volts, -self._highest, self._highest).astype(np.float32), None
+
+    @abstractmethod
+    def _voltage(self, wanted: Motion, q: Array, q_dot: Array, current: Array) -> Array: ...
+
+
+class SmoothPD(_Following):
+    """The paper's PD (eq. 27) on a reference without a step.
+
+    Args:
+        env: the environment that it will act in, at the PD's control frequency.
+        pose: what joints 2..n-2 end in [rad], (n,); the start pose when None.
+        reach_time: from the start to the target [s].
+    """
+
+    def _voltage(self, wanted: Motion, q: Array, q_dot: Array, current: Array) -> Array:
+        return PAPER_KP * (wanted.q - q) + PAPER_KD * (wanted.q_dot - q_dot)
+
+
+class GravityPD(SmoothPD):
+    """`SmoothPD` plus the voltage that holds the reference's pose at rest with least copper loss.
+
+    That voltage carries gravity as far as the elbows do not: R i with the elbow forces of `InverseDynamics.drive`.
+    """
+
+    def _voltage(self, wanted: Motion, q: Array, q_dot: Array, current: Array) -> Array:
+        rest = np.zeros_like(wanted.q)
+        holding = self._inverse.voltage(rest, self._inverse.drive(wanted.q, rest, rest).current)
+        return super()._voltage(wanted, q, q_dot, current) + holding
+
+
+class ComputedTorque(_Following):
+    """Inverse dynamics of the arm, the elbows and the motors, with both error poles at -BANDWIDTH.
+
+    The asked acceleration q_d_ddot + 2 b (q_d_dot - q_dot) + b^2 (q_d - q), projected onto the elbows' plane, gives
+    currents by inverse dynamics with the elbow forces of least copper loss; the voltage brings the armatures there
+    within one control period.
+
+    Args:
+        env: the environment that it will act in; `COMPUTED` has its arguments.
+        pose: what joints 2..n-2 end in [rad], (n,); the start pose when None.
+        reach_time: from the start to the target [s].
+    """
+
+    def _voltage(self, wanted: Motion, q: Array, q_dot: Array, current: Array) -> Array:
+        asked = wanted.q_ddot + 2.0 * BANDWIDTH * (wanted.q_dot - q_dot) + BANDWIDTH**2 * (wanted.q - q)
+        drive = self._inverse.drive(q, q_dot, self._inverse.held_acceleration(q, q_dot, asked))
+        return self._inverse.held_voltage(q_dot, current, drive.current, self._period)
+
+
+@cache
+def economical_pose(arm: ArmParameters, elbows: tuple[int, ...], circle: Circle) -> Array:
+    """The pose [rad], (n,), whose idle joints hold the arm over the circle with least copper loss, none below z = 0."""
+    return best_postures(arm, elbows, circle)[0].pose
+
+
+def economical_computed_torque(env: Env) -> ComputedTorque:
+    """`ComputedTorque` that moves to `economical_pose` first."""
+    episodes = env.unwrapped.episodes
+    return ComputedTorque(env, economical_pose(episodes.arm, episodes.settings.elbow_joints, episodes.circle.widest))

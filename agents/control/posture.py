@@ -1,0 +1,116 @@
+"""Where the redundant joints should stand: the posture that holds the arm over the circle with least copper loss."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.control.inverse_dynamics import InverseDynamics
+from elbow_gym.kinematics import inverse_kinematics, pitches
+from elbow_gym.parameters import ArmParameters
+from elbow_gym.task.circle import Circle
+
+Array = NDArray[np.float64]
+
+CIRCLE_POINTS = 8
+SPREAD = 1.0
+"""Standard deviation of the poses that a search starts from [rad]."""
+BEND = 0.2
+"""Least bend of the last joint [rad]: stretched, the hand could not follow both ways."""
+
+
+@dataclass(frozen=True)
+class Posture:
+    """A pose of the idle joints and what holding the arm in it costs."""
+
+    pose: Array
+    """Joint angles [rad], (n,); joints 1, n-1 and n are those for the circle's first point."""
+    copper_loss: float
+    """Mean of sum R i^2 at rest over the circle [W]."""
+
+
+def static_copper_loss(arm: ArmParameters, elbows: Sequence[int], q: Array) -> Array:
+    """Sum of R i^2 at rest [W], (...), at poses [rad], (..., n), with the elbow forces of least loss."""
+    inverse = InverseDynamics(arm, elbows)
+    rest = np.zeros_like(q)
+    return (inverse.resistance * inverse.drive(q, rest, rest).current ** 2).sum(axis=-1)
+
+
+def best_postures(
+    arm: ArmParameters,
+    elbows: Sequence[int],
+    circle: Circle,
+    above_table: bool = True,
+    starts: int = 12,
+    seed: int = 0,
+) -> list[Posture]:
+    """Local minima of the static copper loss over the joints 2..n-2, the best first.
+
+    Joints 1, n-1 and n put the hand on the circle; elbows stay at z = 0 and, with `above_table`, no joint is below it.
+
+    Args:
+        arm: the arm.
+        elbows: joint numbers held at z = 0.
+        circle: the hand's path.
+        above_table: whether every joint and the hand must have z >= 0.
+        starts: searches, one from the arm's nominal pose and the others from normal noise about it.
+        seed: of the noise.
+
+    Raises:
+        ValueError: no search found a posture that meets its conditions.
+    """
+    from scipy.optimize import minimize
+    from threadpoolctl import threadpool_limits
+
+    n, nominal, length = arm.n_joints, np.array(arm.nominal_pose), arm.of_links("length")
+    start = circle.position(0.0)
+    target = circle.position(2.0 * np.pi / CIRCLE_POINTS * np.arange(CIRCLE_POINTS))
+    wanted = np.stack([np.hypot(target[:, 0], target[:, 1]), target[:, 2]], axis=-1)
+    free = np.array([k for k in range(2, n + 1) if k + 1 not in elbows])
+
+    def poses(angles: Array) -> Array:
+        """The idle joints' angles, then one pair of the last two joints per point, as poses (points, n)."""
+        idle = np.tile(np.concatenate([nominal[:1], angles[: n - 3]]), (CIRCLE_POINTS, 1))
+        return np.concatenate([idle, angles[n - 3 :].reshape(CIRCLE_POINTS, 2)], axis=1)
+
+    def ends(angles: Array) -> Array:
+        phi = pitches(poses(angles))
+        return np.stack([np.cumsum(length * np.sin(phi), axis=-1), np.cumsum(length * np.cos(phi), axis=-1)], axis=-1)
+
+    def held(angles: Array) -> Array:
+        places = ends(angles)
+        return np.concatenate([(places[:, -1] - wanted).ravel(), places[0, [e - 2 for e in elbows], 1]])
+
+    conditions = [
+        {"type": "eq", "fun": held},
+        {"type": "ineq", "fun": lambda angles: angles[n - 2 :: 2] - BEND},
+    ]
+    if above_table:
+        conditions.append({"type": "ineq", "fun": lambda angles: ends(angles)[:, free - 1, 1].ravel()})
+    rng = np.random.default_rng(seed)
+    found: list[Posture] = []
+    for k in range(starts):
+        idle = np.clip(nominal[1:-2] + (rng.normal(scale=SPREAD, size=n - 3) if k else 0.0), -3.0, 3.0)
+        guess = np.concatenate([idle, np.tile(nominal[-2:], CIRCLE_POINTS)])
+        # BLAS adds up in another order on more threads, and where a flat valley's search ends shows it.
+        with threadpool_limits(1, user_api="blas"):
+            best = minimize(
+                lambda angles: float(static_copper_loss(arm, elbows, poses(angles)).mean()),
+                guess,
+                method="SLSQP",
+                constraints=conditions,
+                bounds=[(-np.pi, np.pi)] * guess.size,
+                options={"maxiter": 300, "ftol": 1e-6},
+            )
+        met = all((c["fun"](best.x) > -1e-6).all() for c in conditions) and (np.abs(held(best.x)) < 1e-6).all()
+        if met:
+            pose = inverse_kinematics(arm, poses(best.x)[0], start)[0]
+            found.append(Posture(pose, float(best.fun)))
+    if not found:
+        raise ValueError(
+            f"circle must allow a posture with the elbows {tuple(elbows)} down, got none in {starts} searches"
+        )
+    return sorted(found, key=lambda posture: posture.copper_loss)

@@ -1,0 +1,69 @@
+"""A state trajectory on the control grid: what an optimisation leaves behind and what controllers follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.files import write_whole
+from elbow_gym.env import ElbowArmEnv
+from elbow_gym.vector_env import ElbowArmVectorEnv
+
+Array = NDArray[np.float64]
+
+
+OPTIMA = Path(__file__).parents[2] / "benchmarks" / "results" / "optimal"
+"""Where `python -m benchmarks optimal` leaves the optimal trajectories."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """States at the N + 1 ends of the control periods and the voltages held in between."""
+
+    q: Array
+    """Relative joint angles [rad], (N + 1, n)."""
+    q_dot: Array
+    """[rad/s], (N + 1, n)."""
+    current: Array
+    """Armature currents [A], (N + 1, n)."""
+    voltage: Array
+    """Terminal voltages [V], (N, n)."""
+
+    def save(self, path: Path) -> None:
+        """Writes a compressed .npz without pickles, whole or not at all."""
+        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
+        write_whole(path, lambda temporary: np.savez_compressed(temporary, **arrays))
+
+    @classmethod
+    def load(cls, path: Path) -> Trajectory:
+        """Reads what `save` wrote."""
+        with np.load(path, allow_pickle=False) as arrays:
+            return cls(**{field.name: arrays[field.name] for field in fields(cls)})
+
+
+class OpenLoop:
+    """Plays the voltages of a trajectory, whatever happens.
+
+    Args:
+        env: the environment that it will act in, at the trajectory's control frequency.
+        trajectory: the voltages.
+    """
+
+    def __init__(self, env: ElbowArmEnv | ElbowArmVectorEnv, trajectory: Trajectory) -> None:
+        episodes = env.unwrapped.episodes
+        self._actions = np.clip(
+            trajectory.voltage / episodes.volts_per_action, -episodes.highest_action, episodes.highest_action
+        )
+        self._steps = 0
+
+    def predict(
+        self, observation: NDArray[np.float32], *_args: Any, **_kwargs: Any
+    ) -> tuple[NDArray[np.float32], None]:
+        """The next period's actions (..., n) for observations (..., size); the first call is the episode's start."""
+        action = self._actions[self._steps].astype(np.float32)
+        self._steps += 1
+        return np.broadcast_to(action, (*observation.shape[:-1], action.size)).copy(), None

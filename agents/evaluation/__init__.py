@@ -1,0 +1,1 @@
+"""Plays controllers and says what it cost."""

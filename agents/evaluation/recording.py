@@ -1,0 +1,124 @@
+"""Plays a controller through the environment and keeps what happened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.control.controller import Controller
+from elbow_gym.task.settings import Settings
+from elbow_gym.vector_env import ElbowArmVectorEnv
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """B whole episodes at T + 1 instants: the start and the end of every (or every few) control periods."""
+
+    settings: Settings
+    seeds: tuple[int, ...]
+    time: Array
+    """[s], (T + 1,)."""
+    q: Array
+    """Relative joint angles [rad], (T + 1, B, n)."""
+    q_dot: Array
+    """[rad/s], (T + 1, B, n)."""
+    hand: Array
+    """[m], (T + 1, B, 3)."""
+    target: Array
+    """[m], (T + 1, B, 3)."""
+    electrical_energy: Array
+    """Signed, since the start, per joint [J], (T + 1, B, n)."""
+    drawn_energy: Array
+    """Positive power alone [J], (T + 1, B, n)."""
+    copper_loss: Array
+    """[J], (T + 1, B, n)."""
+    link_work: Array
+    """[J], (T + 1, B, n)."""
+    elbow_force: Array
+    """[N], (T + 1, B, p); negative where the table pulls."""
+    below_table: Array
+    """Time under the table since the start [s], (T + 1, B)."""
+    voltage: Array
+    """The largest in size since the instant before (zero at the first) [V], (T + 1, B, n)."""
+    current: Array
+    """[A], (T + 1, B, n)."""
+
+
+def record(
+    settings: Settings,
+    make_controller: Callable[[ElbowArmVectorEnv], Controller],
+    seeds: Sequence[int],
+    progress: Callable[[int, int], None] | None = None,
+    every: int = 1,
+) -> Recording:
+    """Runs one episode per seed, side by side, through the batched environment's `step`.
+
+    Args:
+        settings: the environment's arguments.
+        make_controller: gives the controller for the environment.
+        seeds: one per episode.
+        progress: called with the periods done and in all, a hundred times a run.
+        every: keeps the end of every so many control periods, a divisor of their number.
+
+    Raises:
+        ValueError: `every` does not divide the number of control periods.
+        ArithmeticError: the simulation left what float64 can represent.
+    """
+    horizon = settings.horizon
+    if every < 1 or horizon % every:
+        raise ValueError(f"every must divide the number of control periods ({horizon}), got {every}")
+    env = ElbowArmVectorEnv(len(seeds), **settings.arguments, autoreset_mode="Disabled")
+    controller = make_controller(env)
+    observation, _ = env.reset(seed=list(seeds))
+    episodes = env.episodes
+    series: dict[str, Any] = {}
+
+    def keep(k: int, voltage: Array) -> None:
+        simulator = episodes.simulator
+        values = {
+            "q": simulator.q,
+            "q_dot": simulator.q_dot,
+            "hand": simulator.hand_position,
+            "target": episodes.target(),
+            "electrical_energy": simulator.electrical_energy,
+            "drawn_energy": simulator.drawn_energy,
+            "copper_loss": simulator.copper_loss,
+            "link_work": simulator.link_work,
+            "elbow_force": simulator.elbow_force,
+            "below_table": simulator.below_table,
+            "voltage": voltage,
+            "current": simulator.current,
+        }
+        for name, value in values.items():
+            if name not in series:
+                series[name] = np.empty((horizon // every + 1, *value.shape))
+            series[name][k] = value
+
+    largest = np.zeros((len(seeds), episodes.arm.n_joints))
+    keep(0, largest)
+    for k in range(1, horizon + 1):
+        action, _ = controller.predict(observation, deterministic=True)
+        observation, _, terminated, _, info = env.step(action)
+        if terminated.any():
+            raise ArithmeticError(f"the simulation left what float64 can represent at {k * settings.control_period} s")
+        largest = np.where(np.abs(info["voltage"]) > np.abs(largest), info["voltage"], largest)
+        if k % every == 0:
+            keep(k // every, largest)
+            largest = np.zeros_like(largest)
+        if progress is not None and k % max(1, horizon // 100) == 0:
+            progress(k, horizon)
+    time = np.arange(horizon // every + 1) * (every * settings.control_period)
+    return Recording(settings, tuple(seeds), time, **series)
+
+
+def thinned(run: Recording, period: float) -> Recording:
+    """The recording at every `period` seconds alone."""
+    stride = max(1, round(period / run.time[1]))
+    names = [field.name for field in fields(run) if isinstance(getattr(run, field.name), np.ndarray)]
+    return replace(run, **{name: getattr(run, name)[::stride].copy() for name in names})

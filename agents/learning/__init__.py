@@ -1,0 +1,1 @@
+"""Trains policies: PPO, SAC, imitation."""

@@ -1,0 +1,173 @@
+"""The callback of a training run: evaluates, checkpoints, and keeps the best policy."""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
+from tqdm import tqdm
+
+from agents.learning.checkpoint import save_checkpoint
+from agents.learning.evaluation import (
+    evaluation,
+    evaluation_row,
+    evaluation_seeds,
+    read_evaluations,
+    sentence,
+    write_evaluations,
+)
+from agents.learning.run_folder import Run
+from agents.learning.training_env import MeteredVectorEnv
+from agents.policy import Policy, load_policy, pair, policy_of
+from elbow_gym.task.settings import Settings
+
+
+class Keeper(BaseCallback):
+    """Evaluates every so many control periods, keeps what was best by return, and saves checkpoints by the clock.
+
+    Args:
+        run: the run.
+        env: the batched environment under the model's.
+        progress: what the checkpoint that goes on holds; None for a new run.
+        position: of the progress bar on the terminal.
+    """
+
+    def __init__(
+        self, run: Run, env: MeteredVectorEnv, progress: Mapping[str, Any] | None = None, position: int = 0
+    ) -> None:
+        super().__init__()
+        self._run, self._env, self._settings = run, env, Settings(**run.environment)
+        self._evaluated = -1 if progress is None else int(progress["evaluated"])
+        self._training = 0.0 if progress is None else float(progress["training_seconds"])
+        self._wall = 0.0 if progress is None else float(progress["wall_seconds"])
+        self._first = 0 if progress is None else int(progress["steps"])
+        self._now = self._saved = time.monotonic()
+        self._rows = [] if progress is None else read_evaluations(run.folder, self._first)
+        self._best = _best_so_far(run.folder) if progress is not None else None
+        self._bar = tqdm(
+            total=run.settings.total_timesteps,
+            initial=self._first,
+            desc=run.name,
+            position=position,
+            unit="step",
+            unit_scale=True,
+            disable=None,
+        )
+
+    @property
+    def best(self) -> Policy:
+        """The policy with the best return so far."""
+        if self._best is None:
+            raise RuntimeError("no policy was evaluated yet")
+        return self._best
+
+    @property
+    def seconds(self) -> tuple[float, float]:
+        """Time that the training took without evaluations and checkpoints, and in all [s]."""
+        return self._training, self._wall
+
+    def tick(self, training: bool) -> None:
+        """Counts the time since the last call as training or not."""
+        now = time.monotonic()
+        self._wall += now - self._now
+        self._training += now - self._now if training else 0.0
+        self._now = now
+
+    def show(self, steps: int) -> None:
+        """Moves the progress bar."""
+        self._bar.update(steps - self._bar.n)
+
+    def _on_step(self) -> bool:
+        spent = self._wall + time.monotonic() - self._now
+        return self._run.minutes is None or spent < 60.0 * self._run.minutes
+
+    def _on_rollout_start(self) -> None:
+        done = self.num_timesteps / self._run.settings.total_timesteps
+        self._env.set_energy_weight(self._run.settings.energy_share(done) * self._settings.energy_weight)
+        self._run.settings.follow_plan(self.model, done)
+        every = self._run.settings.evaluate_every
+        if self.num_timesteps // every > self._evaluated // every:
+            self.evaluate(self.model)
+        if time.monotonic() - self._saved > self._run.checkpoint_seconds:
+            parent = multiprocessing.parent_process()
+            if parent is not None and not parent.is_alive():
+                # Nobody waits for this seed any more, and whoever resumes it would train beside it.
+                raise KeyboardInterrupt
+            self.checkpoint(self.model)
+
+    def _on_rollout_end(self) -> None:
+        self.show(self.num_timesteps)
+        # Less than an episode would show now its reach, now its tracking.
+        if self._env.metered_periods >= self._settings.horizon * self._env.num_envs:
+            for name, mean in self._env.read_meters().items():
+                # Rewards as an episode sums them up, next to its return.
+                scale = self._settings.horizon if name.startswith("reward") else 1.0
+                self.logger.record(f"rollout/{name}", scale * mean)
+
+    def finish(self, model: BaseAlgorithm) -> None:
+        """The last evaluation and checkpoint, after the training or its interruption."""
+        self._bar.close()
+        self.evaluate(model)
+        if model.num_timesteps < self._run.settings.total_timesteps:
+            # Stopped between an action and its outcome: whoever goes on starts new episodes.
+            model._last_obs = None
+        self.checkpoint(model)
+
+    def checkpoint(self, model: BaseAlgorithm) -> None:
+        """Saves all that a resumed run needs."""
+        self.tick(training=True)
+        progress = {
+            "steps": model.num_timesteps,
+            "evaluated": self._evaluated,
+            "training_seconds": self._training,
+            "wall_seconds": self._wall,
+        }
+        save_checkpoint(self._run.folder, model, model.get_env(), progress)
+        self.tick(training=False)
+        self._saved = self._now
+
+    def evaluate(self, model: BaseAlgorithm) -> None:
+        """Plays the deterministic policy on the evaluation seeds; says what came out and keeps the best."""
+        if model.num_timesteps == self._evaluated:
+            return
+        self.tick(training=True)
+        self._evaluated = model.num_timesteps
+        training = {"timesteps": model.num_timesteps, "seconds": round(self._training, 1)}
+        policy = policy_of(model, self._settings, **self._run.card(training))
+        figures = evaluation(policy, self._settings)
+        for name, value in figures.items():
+            model.logger.record(f"evaluation/{name}", value)
+        self._rows.append(evaluation_row(model.num_timesteps, self._training, self._wall, figures))
+        write_evaluations(self._run.folder, self._rows)
+        if self._best is None or figures["return"] > self._best.card.evaluation["return"]:
+            policy.card.evaluation.update(figures, seeds=list(evaluation_seeds(self._settings)))
+            policy.save(self._run.folder / "best")
+            self._best = policy
+        self._say(model.num_timesteps, figures)
+        self.tick(training=False)
+
+    def _say(self, steps: int, figures: Mapping[str, float]) -> None:
+        if not self._bar.disable:
+            energy, error = figures["electrical_energy"], figures["steady_error_rms_mm"]
+            self._bar.set_postfix_str(f"{figures['return']:.1f}, {energy:.0f} J, {error:.1f} mm")
+            return
+        done = max(1, steps - self._first)
+        left = self._wall * (self._run.settings.total_timesteps - steps) / done if steps > self._first else math.nan
+        eta = f", {left / 60:.0f} min left" if left > 0.0 else ""
+        line = f"{self._run.name}: {steps:>9,d} steps, {self._training:4.0f} s{eta}: {sentence(figures)}"
+        print(line, file=sys.stdout, flush=True)
+
+
+def _best_so_far(folder: Path) -> Policy | None:
+    try:
+        return load_policy(folder / "best") if pair(folder / "best")[0].is_file() else None
+    except ValueError:
+        # Killed between the two files of a save: what the checkpoint repeats writes them anew.
+        return None

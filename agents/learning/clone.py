@@ -1,0 +1,212 @@
+"""Clones the LQR on the optimum into a network: imitation with the network's own visits labelled (DAgger)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.control.lqr import TimeVaryingLQR
+from agents.control.trajectory import Trajectory
+from agents.files import write_text
+from agents.learning.clone_settings import CloneSettings
+from agents.learning.run_folder import check_run, machine, open_run, versions
+from agents.policy import Policy, PolicyCard
+from agents.workers import Job, Tell, in_processes
+from elbow_gym.task.settings import Settings
+from elbow_gym.vector_env import ElbowArmVectorEnv
+
+LOWEST_RATE = 0.01
+"""The learning rate ends at this share of its start."""
+
+
+def clone(
+    settings: Settings,
+    trajectory: Trajectory,
+    how: CloneSettings,
+    seed: int,
+    card: dict[str, Any],
+    after_round: Callable[[int, Policy], Any],
+) -> Policy:
+    """Fits a network to the actions of the LQR around a trajectory, on the states that the network itself runs into.
+
+    Args:
+        settings: the environment's, JSON types only.
+        trajectory: the optimum that the teacher follows.
+        how: the settings of the imitation.
+        seed: of the network, the start poses, the noise and the batches.
+        card: further fields of the policy's card.
+        after_round: called with the control periods played so far and the policy as it is then.
+
+    Returns:
+        The policy after the last round.
+    """
+    import torch
+
+    torch.manual_seed(seed)
+    rng = np.random.default_rng(seed)
+    env = ElbowArmVectorEnv(how.num_envs, **settings.arguments, autoreset_mode="Disabled")
+    teacher = TimeVaryingLQR(env, trajectory)
+    observation, _ = env.reset(seed=rng.integers(2**31, size=how.num_envs).tolist())
+    sizes = (observation.shape[1], *how.hidden, env.action_space.shape[1])
+    network = _network(sizes)
+    optimiser = torch.optim.Adam(network.parameters(), fused=True)
+    seen: list[NDArray[np.float32]] = []
+    labels: list[NDArray[np.float32]] = []
+    policy = _policy(network, sizes, settings, env, card)
+    for k in range(how.rounds):
+        if k > 0:
+            observation, _ = env.reset(seed=rng.integers(2**31, size=how.num_envs).tolist())
+        teacher.restart()
+        taught = rng.random(how.num_envs) < 1.0 - k / (how.teaching * how.rounds)
+        shaken = how.noise * (np.arange(how.num_envs) % 2)
+        for _ in range(settings.horizon):
+            label, _ = teacher.predict(observation)
+            own, _ = policy.predict(observation)
+            seen.append(observation)
+            labels.append(label)
+            action = np.where(taught[:, None], label, own) + shaken[:, None] * rng.standard_normal(label.shape)
+            observation, *_ = env.step(np.clip(action, -1.0, 1.0).astype(np.float32))
+        x, y = torch.from_numpy(np.concatenate(seen)), torch.from_numpy(np.concatenate(labels))
+        for j in range(how.gradient_steps):
+            done = (k + j / how.gradient_steps) / how.rounds
+            rate = how.learning_rate * max(LOWEST_RATE, 0.5 * (1.0 + np.cos(np.pi * done)))
+            for group in optimiser.param_groups:
+                group["lr"] = rate
+            chosen = torch.from_numpy(rng.integers(len(x), size=how.batch_size))
+            loss = ((network(x[chosen]) - y[chosen]) ** 2).mean()
+            optimiser.zero_grad()
+            loss.backward()
+            optimiser.step()
+        policy = _policy(network, sizes, settings, env, card)
+        after_round((k + 1) * settings.horizon * how.num_envs, policy)
+    return policy
+
+
+def _network(sizes: tuple[int, ...]) -> Any:
+    import torch
+
+    layers: list[Any] = []
+    for size, after in pairwise(sizes):
+        layers += [torch.nn.Linear(size, after), torch.nn.Tanh()]
+    return torch.nn.Sequential(*layers[:-1])
+
+
+def _policy(
+    network: Any, sizes: tuple[int, ...], settings: Settings, env: ElbowArmVectorEnv, card: dict[str, Any]
+) -> Policy:
+    weights = {}
+    for k, layer in enumerate(network[::2]):
+        weights[f"weight_{k}"] = layer.weight.detach().numpy().copy()
+        weights[f"bias_{k}"] = layer.bias.detach().numpy().copy()
+    whole = PolicyCard(
+        algorithm="clone",
+        environment=json.loads(json.dumps(settings.arguments)),
+        observation=env.observation_names,
+        layers=sizes,
+        activation="tanh",
+        **card,
+    )
+    return Policy(whole, weights)
+
+
+def clone_all(
+    settings: Settings,
+    trajectory: Path,
+    how: CloneSettings,
+    seeds: list[int],
+    folders: list[Path],
+    command: str,
+    resume: bool = False,
+) -> dict[int, dict[str, Any]]:
+    """Clones with several seeds side by side in processes, with a progress bar; the results by seed.
+
+    Each folder gets what a training's has: `run.json`, `best.json` and `best.safetensors`, `evaluations.csv` and
+    `result.json`. With `resume` the seeds that are finished are left alone; the others, a minute each, start anew.
+
+    Raises:
+        ValueError: there is no such trajectory, or a folder holds a run already and `resume` is not set or it had
+            other settings.
+    """
+    from tqdm import tqdm
+
+    if not trajectory.is_file():
+        raise ValueError(f"trajectory must be a file that `python -m benchmarks optimal` wrote, got no {trajectory}")
+    results: dict[int, dict[str, Any]] = {}
+    jobs: dict[int, Job[dict[str, Any]]] = {}
+    for seed, folder in zip(seeds, folders, strict=True):
+        check_run(folder, _record(settings, trajectory, how, seed), resume)
+        finished = folder / "result.json"
+        if finished.is_file():
+            results[seed] = json.loads(finished.read_text(encoding="utf-8"))
+        else:
+            jobs[seed] = Job(partial(_clone_one, settings, trajectory, how, seed, folder, command), how.rounds)
+    if jobs:
+        with tqdm(total=len(jobs) * how.rounds, unit="round", desc="clone") as bar:
+            results.update(in_processes(jobs, bar.update))
+    return {seed: results[seed] for seed in seeds}
+
+
+def _record(settings: Settings, trajectory: Path, how: CloneSettings, seed: int) -> dict[str, Any]:
+    """What makes the run the run that it is, JSON types only."""
+    plain = {
+        "environment": settings.arguments,
+        "trajectory": hashlib.sha256(trajectory.read_bytes()).hexdigest(),
+        "settings": asdict(how),
+        "seed": seed,
+    }
+    return json.loads(json.dumps(plain))
+
+
+def _clone_one(
+    settings: Settings, trajectory: Path, how: CloneSettings, seed: int, folder: Path, command: str, tell: Tell
+) -> dict[str, Any]:
+    """One seed in a process of its own."""
+    import torch
+
+    from agents.learning.evaluation import evaluation, evaluation_row, evaluation_seeds, write_evaluations
+
+    torch.set_num_threads(1)
+    open_run(folder, _record(settings, trajectory, how, seed), resume=True)
+    rows: list[list[float]] = []
+    best: list[Policy] = []
+    spent, since = 0.0, time.monotonic()
+    started = since
+    training = {**asdict(how), "seed": seed, "machine": machine()}
+    card = {"command": command, "training": training, "versions": versions()}
+
+    def after_round(steps: int, policy: Policy) -> None:
+        nonlocal spent, since
+        spent += time.monotonic() - since
+        figures = evaluation(policy, settings)
+        rows.append(evaluation_row(steps, spent, time.monotonic() - started, figures))
+        write_evaluations(folder, rows)
+        if not best or figures["return"] > best[0].card.evaluation["return"]:
+            policy.card.training.update(timesteps=steps, seconds=round(spent, 1))
+            policy.card.evaluation.update(figures, seeds=list(evaluation_seeds(settings)))
+            policy.save(folder / "best")
+            best[:] = [policy]
+        tell(1)
+        since = time.monotonic()
+
+    clone(settings, Trajectory.load(trajectory), how, seed, card, after_round)
+    result = {
+        "name": folder.name,
+        "seed": seed,
+        "steps": int(rows[-1][0]),
+        "finished": True,
+        "training_seconds": round(spent, 1),
+        "wall_seconds": round(time.monotonic() - started, 1),
+        "best": best[0].card.evaluation,
+    }
+    write_text(folder / "result.json", json.dumps(result, indent=2) + "\n")
+    return result

@@ -1,0 +1,141 @@
+"""Trains SB3 agents on the batched environment: one run here, several seeds side by side in processes."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any
+
+from agents.files import write_text
+from agents.learning.checkpoint import checkpoints, load_checkpoint, load_progress
+from agents.learning.run_folder import Run, open_run
+from agents.learning.sac.settings import SACSettings
+from elbow_gym.task.settings import Settings
+
+SEED_STRIDE = 1_000_000
+"""Arm i of a run with seed s draws from seed s * SEED_STRIDE + i: no two runs share an arm, nor an evaluation's."""
+
+
+def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
+    """Trains one seed; Ctrl-C ends it and keeps the best policy so far.
+
+    Writes into the run's folder: `run.json` (what it is), `best.json` and `best.safetensors` each time an evaluation
+    improves, `evaluations.csv`, a checkpoint, TensorBoard logs, and in the end `result.json`.
+
+    Args:
+        run: what is trained.
+        resume: go on from the folder's latest checkpoint; a run that has made all its steps is left alone. Without a
+            checkpoint it starts anew.
+        position: of the progress bar on the terminal.
+
+    Returns:
+        What stands in `result.json`: name, seed, steps, seconds, and the figures of the best evaluation.
+
+    Raises:
+        ValueError: the folder holds a run and `resume` is not set, or a run with other settings.
+    """
+    import torch
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    from agents.learning.callback import Keeper
+    from agents.learning.training_env import MeteredVectorEnv
+    from elbow_gym.sb3 import SB3VecEnv
+
+    open_run(run.folder, run.record(), resume)
+    found = checkpoints(run.folder)[-1:]
+    progress = load_progress(found[0]) if found else None
+    total = run.settings.total_timesteps
+    if progress is not None and (progress["steps"] >= total or _out_of_time(run, progress)):
+        return json.loads((run.folder / "result.json").read_text(encoding="utf-8"))
+    # Small networks lose more by handing work between threads than they gain.
+    torch.set_num_threads(1)
+    settings = Settings(**run.environment)
+    env = MeteredVectorEnv(run.settings.num_envs, **run.settings.training_arguments(settings.arguments))
+    monitored = VecMonitor(SB3VecEnv(env))
+    if found:
+        model = load_checkpoint(found[0], run.settings.model_class, monitored)
+    else:
+        model = run.settings.model(monitored, run.seed, run.folder / "tensorboard")
+        monitored.seed(run.seed * SEED_STRIDE)
+    keeper = Keeper(run, env, progress, position)
+    try:
+        if not found:
+            _prepare(run, model, env, keeper)
+        env.staggered = True
+        remaining = total - model.num_timesteps
+        model.learn(remaining, callback=keeper, log_interval=run.settings.log_interval, reset_num_timesteps=False)
+    except KeyboardInterrupt:
+        print(f"{run.name}: interrupted; keeping the best policy so far", file=sys.stderr)
+    keeper.finish(model)
+    training, wall = keeper.seconds
+    result = {
+        "name": run.name,
+        "seed": run.seed,
+        "steps": model.num_timesteps,
+        "finished": model.num_timesteps >= total or (run.minutes is not None and wall >= 60.0 * run.minutes),
+        "training_seconds": round(training, 1),
+        "wall_seconds": round(wall, 1),
+        "best": keeper.best.card.evaluation,
+    }
+    write_text(run.folder / "result.json", json.dumps(result, indent=2) + "\n")
+    return result
+
+
+def _out_of_time(run: Run, progress: dict[str, Any]) -> bool:
+    return run.minutes is not None and progress["wall_seconds"] >= 60.0 * run.minutes
+
+
+def _prepare(run: Run, model: Any, env: Any, keeper: Any) -> None:
+    """What a training starts from, before its first step."""
+    if run.initial_policy is not None:
+        from agents.learning.warm_start import take_over
+        from agents.policy import load_policy
+
+        take_over(model, load_policy(run.initial_policy))
+    if isinstance(run.settings, SACSettings) and run.settings.warm_start != "uniform":
+        from agents.learning.warm_start import fill, imitate
+
+        shown = fill(model, run.settings, env, run.seed, keeper.show)
+        if len(shown.actions) and run.initial_policy is None:
+            imitate(model, shown, run.settings.imitation_steps, run.seed)
+
+
+def train_all(runs: Sequence[Run], workers: int = 2, resume: bool = False) -> list[dict[str, Any]]:
+    """Trains several runs, so many at a time in processes of their own, and returns the results in their order.
+
+    Raises:
+        ValueError: `workers` is not positive, or as `train` does, once the other runs have ended.
+    """
+    if workers < 1:
+        raise ValueError(f"workers must be positive, got {workers}")
+    _compile(runs[0])
+    if workers == 1 or len(runs) == 1:
+        return [train(run, resume, 0) for run in runs]
+    from tqdm import tqdm
+
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    context = multiprocessing.get_context("spawn")
+    lock = context.RLock()
+    with ProcessPoolExecutor(min(workers, len(runs)), context, tqdm.set_lock, (lock,)) as pool:
+        futures = [pool.submit(train, run, resume, k) for k, run in enumerate(runs)]
+        try:
+            return [future.result() for future in futures]
+        except KeyboardInterrupt:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def _compile(run: Run) -> None:
+    """Has the kernel compiled and cached once, before several processes would do so at the same time."""
+    import numpy as np
+
+    from elbow_gym.vector_env import ElbowArmVectorEnv
+
+    env = ElbowArmVectorEnv(1, **run.environment)
+    env.reset(seed=0)
+    env.step(np.zeros(env.action_space.shape, dtype=np.float32))

@@ -1,0 +1,1 @@
+"""The bound, by optimal control."""

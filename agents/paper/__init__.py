@@ -1,0 +1,1 @@
+"""The paper reproduced, and its question asked on a table that cannot pull."""

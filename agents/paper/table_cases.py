@@ -1,0 +1,182 @@
+"""The paper's PD on a table that gives way and cannot pull, from three start poses: runs and their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from agents.control.pd import PAPER_KD, PAPER_KP
+from agents.evaluation.metrics import metrics
+from agents.evaluation.recording import Array, Recording
+from agents.paper.cases import RECORD_PERIOD
+from agents.paper.figures import SETTLED
+from elbow_gym.kinematics import hand_position, inverse_kinematics, joint_positions
+from elbow_gym.parameters import ArmParameters
+from elbow_gym.simulator import Simulator
+from elbow_gym.task.settings import Settings
+
+FRICTIONS = (0.0, 0.1, 0.3)
+"""Coulomb's coefficient of the table [-]."""
+
+LIFTS: dict[str, tuple[float, float]] = {
+    "joints 4 and 7": (0.0, 0.0),
+    "joint 4": (0.0, 0.1),
+    "clear": (0.1, 0.2),
+}
+"""Heights of joints 4 and 7 in the start pose [m] by what then touches the table.
+
+The PD has no gravity compensation: as the arm swings over at the start, joint 7 sags by 0.07 m where joint 4 leans and
+by up to 0.2 m where nothing does.
+"""
+
+
+@dataclass(frozen=True)
+class TableRecording(Recording):
+    """A run on the compliant table; its arms are side by side, one per start."""
+
+    normal_force: Array
+    """Of the table on joints 3..n and, last, the hand [N], (T + 1, B, n - 1); never negative."""
+    contact_loss: Array
+    """Since the start, of all contacts [J], (T + 1, B)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableNumbers:
+    """What one start under one friction cost under the paper's PD; forces are the table's, upward."""
+
+    energy: float
+    """Signed electrical energy of the whole run [J]."""
+    energy_tracking: float
+    """The same from t = 2 s on [J]."""
+    copper_loss_tracking: float
+    """Heat in the windings from t = 2 s on [J]."""
+    contact_loss: float
+    """Heat in the contacts over the whole run [J]."""
+    contact_loss_tracking: float
+    """The same from t = 2 s on [J]."""
+    error_rms: float
+    """Hand error from t = 2 s on [mm]."""
+    z_rms: float
+    """Its vertical part [mm]."""
+    force_4_mean: float
+    """On joint 4 from t = 2 s on [N]."""
+    force_4_smallest: float
+    """Likewise [N]."""
+    force_4_largest: float
+    """Likewise [N]."""
+    force_7_mean: float
+    """On joint 7 from t = 2 s on [N]."""
+    force_7_smallest: float
+    """Likewise [N]."""
+    force_7_largest: float
+    """Likewise [N]."""
+    force_elsewhere_largest: float
+    """On any other joint or the hand over the whole run [N]: what a swing at the start strikes."""
+
+
+def start_pose(arm: ArmParameters, lift: tuple[float, float]) -> Array:
+    """The nominal pose with joints 4 and 7 at the heights `lift` [m] and the hand where it was [rad], (n,).
+
+    Links 2-3 turn about joint 2 and links 4-6 about joint 4, each as one piece; links 7 and 8 keep their direction, and
+    joints n-1 and n put the hand back. Raises ValueError where they cannot.
+    """
+    pose = np.array(arm.nominal_pose)
+    positions = joint_positions(arm, pose)
+    radius = np.hypot(positions[:, 0], positions[:, 1])
+    inner = np.arcsin(lift[0] / radius[3])
+    outer = np.arcsin((lift[1] - lift[0]) / (radius[6] - radius[3]))
+    pose[[1, 3, 6]] += -inner, inner - outer, outer
+    return inverse_kinematics(arm, pose, hand_position(arm, np.array(arm.nominal_pose)))[0]
+
+
+def play_on_table(
+    poses: Sequence[Array], friction: float, settings: Settings, progress: Callable[[int], Any] | None = None
+) -> TableRecording:
+    """One run of the paper's PD per start pose, side by side, on the compliant table with no rigid elbow.
+
+    Args:
+        poses: start poses [rad], (n,) each, which the PD keeps on its idle joints.
+        friction: of the table [-].
+        settings: circle, control frequency and duration; voltages are not limited.
+        progress: told the control periods done since it was last told.
+
+    Raises:
+        ArithmeticError: the simulation left what float64 can represent.
+    """
+    arm, circle, period = settings.parsed_arm, settings.parsed_circle, settings.control_period
+    simulator = Simulator(arm, 0, len(poses), timestep=period, table={"friction": friction})
+    time = np.arange(settings.horizon + 1) * period
+    angle = circle.angle(time, 0.0)
+    target, velocity = circle.position(angle), circle.velocity(angle)
+    desired = [inverse_kinematics(arm, pose, target, velocity) for pose in poses]
+    q_d, q_d_dot = (np.stack(series, axis=1) for series in zip(*desired, strict=True))
+    simulator.reset(np.stack(poses))
+    every = max(1, round(RECORD_PERIOD / period))
+    kept: list[dict[str, Array]] = []
+    largest = np.zeros_like(simulator.q)
+    for k in range(settings.horizon + 1):
+        if k % every == 0:
+            kept.append({**_instant(simulator), "voltage": largest})
+            largest = np.zeros_like(largest)
+        if k < settings.horizon:
+            voltage = PAPER_KP * (q_d[k] - simulator.q) + PAPER_KD * (q_d_dot[k] - simulator.q_dot)
+            largest = np.where(np.abs(voltage) > np.abs(largest), voltage, largest)
+            if simulator.advance(voltage, 1):
+                raise ArithmeticError(f"the simulation left what float64 can represent at {time[k]:g} s")
+        if progress is not None and k and k % 500 == 0:
+            progress(500)
+    series = {name: np.stack([values[name] for values in kept]) for name in kept[0]}
+    shown = np.repeat(target[::every, None], len(poses), axis=1)
+    return TableRecording(settings, (0,) * len(poses), time[::every], target=shown, **series)
+
+
+def _instant(simulator: Simulator) -> dict[str, Array]:
+    views = {
+        "q": simulator.q,
+        "q_dot": simulator.q_dot,
+        "hand": simulator.hand_position,
+        "electrical_energy": simulator.electrical_energy,
+        "drawn_energy": simulator.drawn_energy,
+        "copper_loss": simulator.copper_loss,
+        "link_work": simulator.link_work,
+        "elbow_force": simulator.elbow_force,
+        "below_table": simulator.below_table,
+        "current": simulator.current,
+    }
+    forces = simulator.contact_force[..., 2]
+    return {
+        **{name: view.copy() for name, view in views.items()},
+        "normal_force": forces,
+        "contact_loss": simulator.contact_loss.sum(axis=1),
+    }
+
+
+def measure_on_table(run: TableRecording) -> list[TableNumbers]:
+    """The numbers of each of the run's arms."""
+    whole, late = metrics(run), metrics(run, SETTLED)
+    settled = np.searchsorted(run.time, SETTLED - 1e-9)
+    # The first contact is joint 3's.
+    force = {joint: run.normal_force[settled:, :, joint - 3] for joint in (4, 7)}
+    elsewhere = np.delete(run.normal_force, [4 - 3, 7 - 3], axis=2).max(axis=(0, 2))
+    values = {
+        "energy": whole["electrical_energy"],
+        "energy_tracking": late["electrical_energy"],
+        "copper_loss_tracking": late["copper_loss"],
+        "contact_loss": run.contact_loss[-1],
+        "contact_loss_tracking": run.contact_loss[-1] - run.contact_loss[settled],
+        "error_rms": late["error_rms"],
+        "z_rms": late["z_rms"],
+        "force_elsewhere_largest": elsewhere,
+    }
+    for joint, found in force.items():
+        values |= {
+            f"force_{joint}_mean": found.mean(axis=0),
+            f"force_{joint}_smallest": found.min(axis=0),
+            f"force_{joint}_largest": found.max(axis=0),
+        }
+    return [
+        TableNumbers(**{name: float(value[arm]) for name, value in values.items()}) for arm in range(len(run.seeds))
+    ]

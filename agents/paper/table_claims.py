@@ -1,0 +1,167 @@
+"""The paper's question asked again on the table of `tabletop`: numbers, verdict and command."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from agents.files import write_csv, write_text, write_whole
+from agents.paper.cases import RESULTS, settings_of
+from agents.paper.claims import Claim
+from agents.paper.table_cases import (
+    FRICTIONS,
+    LIFTS,
+    TableNumbers,
+    TableRecording,
+    measure_on_table,
+    play_on_table,
+    start_pose,
+)
+from agents.paper.table_figure import table_figure
+
+Cases = Mapping[float, Mapping[str, TableNumbers]]
+"""Numbers by friction, then by start, one of `LIFTS`."""
+
+
+@dataclass(frozen=True)
+class TableReproduction:
+    """What `reproduce_on_table` found and where it wrote it."""
+
+    numbers: Cases
+    claims: list[Claim]
+    output: Path
+
+
+def reproduce_on_table(output: Path = Path("reproduction"), publish: bool = False) -> TableReproduction:
+    """Runs the paper's PD from each start under each friction, prints numbers and verdict and writes them.
+
+    Args:
+        output: folder for table_cases.png, table_numbers.csv and table_verdict.md.
+        publish: also refresh the picture and the numbers under benchmarks/results.
+    """
+    from rich.console import Console
+    from rich.markdown import Markdown
+    from tqdm import tqdm
+
+    settings = settings_of(0, "paper")
+    poses = [start_pose(settings.parsed_arm, lift) for lift in LIFTS.values()]
+    runs: dict[float, TableRecording] = {}
+    layout = "{desc} {percentage:3.0f}%|{bar}| {elapsed} elapsed, {remaining} left"
+    with tqdm(total=len(FRICTIONS) * settings.horizon, bar_format=layout) as bar:
+        for friction in FRICTIONS:
+            bar.set_description(f"friction {friction:g}")
+            runs[friction] = play_on_table(poses, friction, settings, bar.update)
+    cases = {friction: dict(zip(LIFTS, measure_on_table(run), strict=True)) for friction, run in runs.items()}
+    text = table_markdown(cases)
+    files = [
+        write_whole(output / "table_cases.png", table_figure(runs).savefig),
+        write_table_numbers(output / "table_numbers.csv", cases),
+        write_text(output / "table_verdict.md", text),
+    ]
+    if publish:
+        picture = files[0].read_bytes()
+        files.append(write_whole(RESULTS / "table_cases.png", lambda temporary: temporary.write_bytes(picture)))
+        files.append(write_table_numbers(RESULTS / "table_numbers.csv", cases))
+    console = Console()
+    console.print(terminal_table(cases))
+    console.print(Markdown(text))
+    console.print("Wrote " + ", ".join(str(path) for path in files))
+    return TableReproduction(cases, table_verdict(cases), output)
+
+
+def table_verdict(cases: Cases) -> list[Claim]:
+    """Whether leaning on the table saves energy, for each friction; nothing here knows the answer."""
+    return [_saving(friction, starts) for friction, starts in cases.items()]
+
+
+def _saving(friction: float, starts: Mapping[str, TableNumbers]) -> Claim:
+    three = [starts[name] for name in LIFTS]
+    whole, late = [n.energy for n in three], [n.energy_tracking for n in three]
+    saved = [1.0 - energy / late[2] for energy in late[:2]]
+    return Claim(
+        f"friction {friction:g}",
+        "The more joints lean on the table, the less energy the arm takes, in the whole run and from 2 s on.",
+        all(values[0] < values[1] < values[2] for values in (whole, late)),
+        f"energy for t > 2 s {_listed(late, 'J')}: two joints save {saved[0]:.1%}, one {saved[1]:.1%}; whole run "
+        f"{_listed(whole, 'J')}; hand error rms {_listed([n.error_rms for n in three], 'mm')}; leaning on two joints, "
+        f"windings turn {three[0].copper_loss_tracking:.3g} J into heat for t > 2 s, contacts "
+        f"{three[0].contact_loss_tracking:.2g} J",
+    )
+
+
+def _listed(values: list[float], unit: str) -> str:
+    return " / ".join(f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}" for value in values) + f" {unit}"
+
+
+def _loads(cases: Cases) -> Iterator[str]:
+    """What the table bears from each start, a value per friction."""
+    for start in LIFTS:
+        numbers = [starts[start] for starts in cases.values()]
+        forces = {
+            "joint 4 for t > 2 s": [n.force_4_mean for n in numbers],
+            "joint 7 for t > 2 s": [n.force_7_mean for n in numbers],
+            "any other point, at most": [n.force_elsewhere_largest for n in numbers],
+        }
+        borne = (f"{name} {_listed(values, 'N')}" for name, values in forces.items() if max(values) > 0.0)
+        yield f"Start {start}: {'; '.join(borne) or 'nothing'}."
+
+
+def table_markdown(cases: Cases) -> str:
+    """Verdict and loads as a Markdown document."""
+    lines = [
+        "# Does leaning save energy on a table that cannot pull?",
+        "",
+        "Three values stand for the starts " + " / ".join(LIFTS) + ". Every verdict is computed from the run.",
+        "",
+    ]
+    for number, claim in enumerate(table_verdict(cases), start=1):
+        holds = "Holds" if claim.holds else "FAILS"
+        lines += [f"{number}. **{holds}** ({claim.name}). {claim.statement}", "", f"   Evidence: {claim.evidence}.", ""]
+    return "\n".join(
+        [
+            *lines,
+            "What the table bears, under friction " + " / ".join(f"{friction:g}" for friction in cases) + ":",
+            "",
+            *(f"- {line}" for line in _loads(cases)),
+            "",
+        ]
+    )
+
+
+def _unit(name: str) -> str:
+    return "N" if name.startswith("force") else "mm" if name.endswith("rms") else "J"
+
+
+def write_table_numbers(path: Path, cases: Cases) -> Path:
+    """Writes a CSV row per friction and start: every field of `TableNumbers`."""
+    names = list(TableNumbers.__dataclass_fields__)
+    header = ["friction [-]", "start", *(f"{name} [{_unit(name)}]" for name in names)]
+    rows = [
+        [f"{friction:g}", start, *(f"{value:.6g}" for value in asdict(numbers).values())]
+        for friction, starts in cases.items()
+        for start, numbers in starts.items()
+    ]
+    return write_csv(path, header, rows)
+
+
+def terminal_table(cases: Cases) -> Any:
+    """The numbers for the terminal, a row each, a column per friction and start."""
+    from rich.box import SIMPLE
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(
+        title="The paper's PD on a table that cannot pull",
+        box=SIMPLE,
+        caption="Tracking, errors and forces on joints 4 and 7: t > 2 s; forces elsewhere: whole run.",
+    )
+    table.add_column("", no_wrap=True)
+    columns = [(friction, start) for friction, starts in cases.items() for start in starts]
+    for friction, start in columns:
+        table.add_column(f"{start}\nfriction {friction:g}", justify="right")
+    for name in TableNumbers.__dataclass_fields__:
+        values = (getattr(cases[friction][start], name) for friction, start in columns)
+        table.add_row(escape(f"{name} [{_unit(name)}]".replace("_", " ")), *(f"{value:.4g}" for value in values))
+    return table

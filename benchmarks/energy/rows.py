@@ -1,0 +1,26 @@
+"""One row of the energy benchmark."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from benchmarks.energy.statistics import Estimate
+
+
+@dataclass(frozen=True)
+class Row:
+    """One controller at one elbow count in one regime of a part of the benchmark."""
+
+    controller: str
+    elbows: int
+    regime: str
+    figures: dict[str, Estimate]
+    joint_energy: tuple[float, ...]
+    """Interquartile mean of each joint's signed electrical energy [J]."""
+    part: str = "nominal"
+    gain: float = 1.0
+    """Of the PD, times the paper's."""
+    seeds: tuple[dict[str, float], ...] = ()
+    """Of a learned controller: each training seed and its interquartile means over the episodes."""
+    gap: float | None = None
+    """The optimality gap (J - J_opt) / |J_opt| with J = -return; None where no bound was sought."""

@@ -1,0 +1,58 @@
+"""One row of the speed benchmark, and how it compares with MuJoCo's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.speed.own import ENV_STEP, EULER_STEP, RK4_STEP, Contender
+from benchmarks.speed.peers import C_LOOP, MUJOCO
+
+RK4_STEPS_PER_ENV_STEP = 10
+
+
+RATIO = "MuJoCo / this"
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a contender took per unit, in seconds of its clock."""
+
+    contender: Contender
+    samples: tuple[float, ...]
+
+    @property
+    def quartiles(self) -> tuple[float, float, float]:
+        """Lower quartile, median, upper quartile [s]."""
+        low, median, high = np.quantile(self.samples, [0.25, 0.5, 0.75])
+        return float(low), float(median), float(high)
+
+    @property
+    def median(self) -> float:
+        """Median [s]."""
+        return self.quartiles[1]
+
+
+def ratios(rows: Sequence[Row]) -> list[float | None]:
+    """How many times longer MuJoCo takes for the same on the same arm.
+
+    Steps are held against MuJoCo's RK4 step in a C loop, evaluations against mj_forward, and an environment step
+    against as many of those RK4 steps as it holds.
+    """
+    peers = {
+        (row.contender.unit, row.contender.joints, row.contender.elbows): row.median
+        for row in rows
+        if row.contender.family == MUJOCO and row.contender.name in {C_LOOP, "mj_forward"}
+    }
+    found: list[float | None] = []
+    for row in rows:
+        unit, times = row.contender.unit, 1
+        if unit == EULER_STEP:
+            unit = RK4_STEP
+        elif unit == ENV_STEP:
+            unit, times = RK4_STEP, RK4_STEPS_PER_ENV_STEP
+        peer = peers.get((unit, row.contender.joints, row.contender.elbows))
+        found.append(None if peer is None else times * peer / row.median)
+    return found

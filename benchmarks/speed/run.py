@@ -1,0 +1,224 @@
+"""`python -m benchmarks speed`: this project and its peers, one interleaved run, one table, CSV, JSON and a figure."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from agents.files import write_csv, write_text, write_whole
+from benchmarks.machine import PACKAGES, RESULTS, machine, versions
+from benchmarks.speed.environments import START, environment_contenders
+from benchmarks.speed.own import Contender, Sampler, own_contenders
+from benchmarks.speed.peers import MUJOCO, check_agreement, peer_contenders
+from benchmarks.speed.rows import RATIO, Row, ratios
+
+ROUNDS, SECONDS = 11, 0.1
+QUICK_ROUNDS, QUICK_SECONDS = 3, 0.002
+
+
+def contenders(quick: bool = False) -> list[Contender]:
+    """All rows, in the table's order."""
+    return own_contenders() + peer_contenders() + environment_contenders(quick)
+
+
+def measure(
+    chosen: Sequence[Contender], quick: bool, progress: Callable[[str, float], None]
+) -> tuple[list[Row], dict[str, str]]:
+    """Times all contenders in interleaved rounds, then those that want to be alone.
+
+    Args:
+        chosen: the contenders.
+        quick: few and short samples.
+        progress: gets what is going on and the seconds of planned work done since the last call.
+
+    Returns:
+        The rows, and the families that were skipped (all or in part) with the reason.
+    """
+    rounds, seconds = (QUICK_ROUNDS, QUICK_SECONDS) if quick else (ROUNDS, SECONDS)
+    samples: dict[int, list[float]] = {k: [] for k in range(len(chosen))}
+    skipped: dict[str, str] = {}
+
+    def prepare(k: int, stack: ExitStack) -> Sampler | None:
+        try:
+            return chosen[k].make(stack)
+        except missing_library() as error:
+            skipped.setdefault(chosen[k].family, str(error).splitlines()[0])
+            return None
+
+    def take(k: int, sampler: Sampler, length: float) -> None:
+        samples[k].append(sampler(length))
+        progress(f"{chosen[k].family}: {chosen[k].name}", planned(chosen[k], quick))
+
+    together = [k for k, contender in enumerate(chosen) if contender.rounds is None]
+    with ExitStack() as stack:
+        ready: dict[int, Sampler] = {}
+        for k in together:
+            progress(f"preparing {chosen[k].name}", 0.0)
+            sampler = prepare(k, stack)
+            if sampler is not None:
+                ready[k] = sampler
+        for _ in range(rounds):
+            for k, sampler in ready.items():
+                take(k, sampler, planned(chosen[k], quick))
+    for k, contender in enumerate(chosen):
+        if contender.rounds is not None:
+            with ExitStack() as stack:
+                progress(f"{contender.family}: {contender.name}", 0.0)
+                sampler = prepare(k, stack)
+                for _ in range(1 if quick else contender.rounds):
+                    if sampler is not None:
+                        take(k, sampler, seconds)
+    return [Row(chosen[k], tuple(found)) for k, found in samples.items() if found], skipped
+
+
+def missing_library() -> tuple[type[Exception], ...]:
+    """What is raised when an optional library is not there."""
+    from gymnasium.error import DependencyNotInstalled
+
+    return ImportError, DependencyNotInstalled
+
+
+def planned(contender: Contender, quick: bool) -> float:
+    """About how long one sample takes [s]."""
+    if contender.rounds is None and quick:
+        return QUICK_SECONDS
+    return contender.seconds or SECONDS
+
+
+HEADER = (
+    "who",
+    "what",
+    "unit",
+    "joints",
+    "elbows",
+    "arms",
+    "threads",
+    "clock",
+    "time",
+    "quartiles",
+    "per second",
+    RATIO,
+)
+
+
+def duration(seconds: float) -> str:
+    """A time with its unit, to three or four digits."""
+    for scale, unit in ((1e6, "us"), (1e3, "ms")):
+        if seconds * scale < 1000.0:
+            return f"{seconds * scale:.3g} {unit}"
+    return f"{seconds:.3g} s"
+
+
+def shown(row: Row, ratio: float | None) -> tuple[str, ...]:
+    """A row's cells under HEADER."""
+    contender, (low, median, high) = row.contender, row.quartiles
+    counts = (contender.joints, contender.elbows, contender.arms, contender.threads)
+    return (
+        contender.family,
+        contender.name,
+        contender.unit,
+        *("-" if count is None else str(count) for count in counts),
+        contender.clock,
+        duration(median),
+        f"{duration(low)} to {duration(high)}",
+        "-" if contender.unit == START else f"{1.0 / median:,.0f}",
+        "-" if ratio is None else f"{ratio:.3g}",
+    )
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    """The table for a README."""
+    lines = [HEADER, ("---",) * len(HEADER)]
+    lines += [shown(row, ratio) for row, ratio in zip(rows, ratios(rows), strict=True)]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def table(rows: Sequence[Row]) -> Any:
+    """The same for the terminal."""
+    from rich.table import Table
+
+    body = Table(title="Time per unit and arm: median and quartiles")
+    for name in HEADER:
+        body.add_column(name, justify="left" if name in HEADER[:3] else "right", no_wrap=True)
+    for k, (row, ratio) in enumerate(zip(rows, ratios(rows), strict=True)):
+        ends = k + 1 == len(rows) or rows[k + 1].contender.family != row.contender.family
+        body.add_row(*shown(row, ratio), end_section=ends)
+    return body
+
+
+def save(rows: Sequence[Row], context: dict[str, Any], folder: Path) -> None:
+    """Writes speed.csv, speed.json, speed.md and speed.png, each whole or not at all."""
+    from benchmarks.speed.figure import figure
+
+    header = ["who", "what", "unit", "joints", "elbows", "arms", "threads", "clock"]
+    header += ["median [us]", "lower quartile [us]", "upper quartile [us]", "samples", RATIO]
+    body: list[list[Any]] = []
+    for row, ratio in zip(rows, ratios(rows), strict=True):
+        who, (low, median, high) = row.contender, row.quartiles
+        cells = [who.family, who.name, who.unit, who.joints, who.elbows, who.arms, who.threads, who.clock]
+        cells += [f"{1e6 * value:.6g}" for value in (median, low, high)]
+        cells += [len(row.samples), None if ratio is None else f"{ratio:.4g}"]
+        body.append(["" if cell is None else cell for cell in cells])
+    write_csv(folder / "speed.csv", header, body)
+    write_text(folder / "speed.json", json.dumps(context, indent=2) + "\n")
+    write_text(folder / "speed.md", markdown(rows))
+    write_whole(folder / "speed.png", lambda temporary: figure(rows, temporary))
+
+
+def speed(output: Path = RESULTS, quick: bool = False) -> list[Row]:
+    """Runs the comparison, prints the table and writes the results. Returns the rows.
+
+    Args:
+        output: folder for the results.
+        quick: few and short samples, to see that all works; the figures mean little then.
+    """
+    from rich.console import Console
+    from tqdm import tqdm
+
+    started, load = time.monotonic(), os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+    differences = check_agreement()
+    chosen = contenders(quick)
+    rounds = QUICK_ROUNDS if quick else ROUNDS
+    work = sum(planned(c, quick) * (rounds if c.rounds is None else 1 if quick else c.rounds) for c in chosen)
+    # Counted in seconds of planned work, so that the time left is about right.
+    form = "{desc:<60.60} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
+    with tqdm(total=work, file=sys.stderr, bar_format=form) as bar:
+
+        def progress(name: str, seconds: float) -> None:
+            bar.set_description_str(name, refresh=False)
+            bar.update(min(seconds, work - bar.n))
+
+        rows, skipped = measure(chosen, quick, progress)
+    context = {
+        "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
+        "made": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "seconds": round(time.monotonic() - started, 1),
+        "machine": {
+            **machine(),
+            "cores": os.cpu_count(),
+            "load_average_before": load,
+        },
+        "versions": versions(*PACKAGES, "mujoco", "pin", "imageio"),
+        "rounds": rounds,
+        "seconds_per_sample": QUICK_SECONDS if quick else SECONDS,
+        "relative_difference_to_the_kernel": differences,
+        "skipped": skipped,
+    }
+    save(rows, context, output)
+    # Wider than a pipe's 80 columns, which would cut the figures.
+    console = Console(width=max(Console().width, 190))
+    console.print(table(rows))
+    for family, reason in skipped.items():
+        console.print(f"Skipped for want of a library: rows of {family} ({reason})", highlight=False)
+    for case, difference in differences.items():
+        soft = " (soft contacts)" if case.startswith(MUJOCO) and not case.endswith(" 0 elbows") else ""
+        console.print(f"Accelerations against the kernel's, {case}: {difference:.1e}{soft}", highlight=False)
+    console.print(f"Written: {output / 'speed.csv'}, speed.json, speed.md, speed.png", highlight=False)
+    return rows

@@ -1,0 +1,1 @@
+"""The task: circle, observation, reward, episodes."""

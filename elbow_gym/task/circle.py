@@ -1,0 +1,282 @@
+"""The target: a closed path in space, a circle by default, as a pure function of its angle, and the angle of time."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import numbers
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elbow_gym import kernel
+from elbow_gym.parameters import ArmParameters, Array, check_entries, finite, positive
+from elbow_gym.task.fourier_path import (
+    PLANES,
+    Point,
+    as_plane,
+    as_shape,
+    circle_path,
+    figure_eight_path,
+    path_rate,
+    plane_axes,
+    points_path,
+)
+from elbow_gym.task.ranges import Range, as_range, draw_number, ends, is_pair
+from elbow_gym.task.reach import reach_shortfall
+
+DIRECTIONS = ("counterclockwise", "clockwise")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Circle:
+    """The circle, or other closed path, that the hand should follow; the defaults are the paper's.
+
+    The angle grows from the plane's first axis to its second: x to y (counterclockwise seen from +z), x to z,
+    y to z, or, in the radial plane through the z axis and the centre, outward to up.
+
+    A quantity given as a range, as several planes or as "random" is drawn anew at each reset (`draw`); until then the
+    circle has no path. Raises ValueError naming the field.
+    """
+
+    center: tuple[Range, Range, Range] = (1.5, 1.5, 0.4)
+    """Centre [m] in world x, y, z, each a number or (low, high)."""
+    radius: Range = 0.1
+    """Radius [m], or (low, high); of the figure-eight half its width."""
+    period: Range = 5.0
+    """Time of one turn [s], or (low, high)."""
+    plane: str | tuple[str, ...] = "xy"
+    """"xy", "xz", "yz" or "radial"; some of them to draw one, or "random" for any."""
+    phase: float | str = 0.0
+    """Angle at time zero [rad], or "random"."""
+    direction: str = "counterclockwise"
+    """"counterclockwise", "clockwise" or "random"."""
+    shape: str | tuple[Point, ...] = "circle"
+    """"circle", "figure_eight", or points [m] in world x, y, z, passed at equal steps of the angle in their order.
+
+    Between the points the path is their trigonometric interpolation; its centre is their mean, and centre, radius and
+    plane have no say."""
+
+    def __post_init__(self) -> None:
+        checked = {
+            "center": _center(self.center),
+            "radius": as_range("circle radius", self.radius, positive),
+            "period": as_range("circle period", self.period, positive),
+            "plane": as_plane(self.plane),
+            "phase": _phase(self.phase),
+            "shape": as_shape(self.shape),
+        }
+        if self.direction not in (*DIRECTIONS, "random"):
+            raise ValueError(f'circle direction must be one of {DIRECTIONS} or "random", got {self.direction!r}')
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+        unused = [name for name in self.drawn if name in ("center", "radius", "plane")]
+        if unused and not isinstance(self.shape, str):
+            raise ValueError(
+                f"circle {unused[0]} must not be random where the shape is given by points, "
+                f"got {getattr(self, unused[0])!r}"
+            )
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> Circle:
+        """A circle from a dict of its fields, the paper's where one is missing. ValueError on an unknown one."""
+        check_entries(plain, {field.name for field in fields(cls)}, "circle")
+        return cls(**plain)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON types, the inverse of `from_dict`."""
+        return {field.name: _listed(getattr(self, field.name)) for field in fields(self)}
+
+    @property
+    def drawn(self) -> tuple[str, ...]:
+        """Names of the fields that `draw` draws, in its order."""
+        order = ("center", "radius", "period", "plane", "direction", "phase")
+        return tuple(name for name in order if _is_random(name, getattr(self, name)))
+
+    @property
+    def random(self) -> bool:
+        """Whether anything but the phase is drawn at each reset."""
+        return any(name != "phase" for name in self.drawn)
+
+    def draw(self, generator: np.random.Generator) -> Circle:
+        """A circle with everything fixed, the phase included.
+
+        Draws in this order, and only what is random: x, y and z of the centre, radius, period, plane, direction, phase.
+        Each takes one draw: `uniform(low, high)`, `integers` of the planes or directions, `uniform(-pi, pi)`.
+        """
+        values: dict[str, Any] = {}
+        for name in self.drawn:
+            value = getattr(self, name)
+            if name == "center":
+                values[name] = tuple(draw_number(coordinate, generator) for coordinate in value)
+            elif name in ("radius", "period"):
+                values[name] = draw_number(value, generator)
+            elif name == "phase":
+                values[name] = generator.uniform(-np.pi, np.pi)
+            else:
+                choices = self.planes if name == "plane" else DIRECTIONS
+                values[name] = choices[generator.integers(len(choices))]
+        return replace(self, **values) if values else self
+
+    @property
+    def widest(self) -> Circle:
+        """The largest circle, else in the middle of the ranges: first plane, counterclockwise from angle zero."""
+        choices = {"plane": self.planes[0], "direction": DIRECTIONS[0], "phase": 0.0}
+        means = {"center": tuple(float(np.mean(ends(x))) for x in self.center)}
+        means |= {"radius": ends(self.radius)[-1], "period": float(np.mean(ends(self.period)))}
+        return replace(self, **{name: {**choices, **means}[name] for name in self.drawn})
+
+    @property
+    def planes(self) -> tuple[str, ...]:
+        """The planes that the circle may lie in."""
+        if isinstance(self.plane, tuple):
+            return self.plane
+        return PLANES if self.plane == "random" else (self.plane,)
+
+    def _fixed(self, name: str) -> Any:
+        value = getattr(self, name)
+        if _is_random(name, value):
+            raise ValueError(f"circle {name} must be drawn first, got {value!r}")
+        return value
+
+    @property
+    def rate(self) -> float:
+        """Signed rate of the angle [rad/s]."""
+        return (2.0 if self._fixed("direction") == "counterclockwise" else -2.0) * math.pi / self._fixed("period")
+
+    def angle(self, time: ArrayLike, phase: ArrayLike) -> Array:
+        """Angle of the target on the circle [rad] at a time [s], starting from `phase` [rad]."""
+        return np.asarray(phase, dtype=np.float64) + self.rate * np.asarray(time, dtype=np.float64)
+
+    @property
+    def path_rows(self) -> int:
+        """Rows of the path: 3 of a circle, 5 of a figure-eight, 1 + 2 floor(m / 2) of m points."""
+        if isinstance(self.shape, tuple):
+            return 1 + len(self.shape) // 2 * 2
+        return 3 if self.shape == "circle" else 5
+
+    @cached_property
+    def path(self) -> Array:
+        """Fourier rows of the path [m], (path_rows, 3): the centre, then what cos a, sin a, cos 2a, ... multiply.
+
+        ValueError while center, radius or plane are still to be drawn.
+        """
+        if isinstance(self.shape, tuple):
+            return points_path(self.shape)
+        center, radius, plane = (self._fixed(name) for name in ("center", "radius", "plane"))
+        of_shape = circle_path if self.shape == "circle" else figure_eight_path
+        return of_shape(center, radius, plane_axes(plane, center))
+
+    def position(self, angle: ArrayLike) -> Array:
+        """Target position r_d [m], shape (..., 3), at an angle [rad], shape (...).   Eq. 28."""
+        return _points(self.path, angle)
+
+    @cached_property
+    def _path_rate(self) -> Array:
+        return path_rate(self.path, self.rate)
+
+    def velocity(self, angle: ArrayLike) -> Array:
+        """Target velocity [m/s], shape (..., 3), at an angle [rad], shape (...)."""
+        return _points(self._path_rate, angle)
+
+
+def _points(path: Array, angle: ArrayLike) -> Array:
+    angle = np.asarray(angle, dtype=np.float64)
+    points = np.empty((angle.size, 3))
+    kernel.path(path, angle.ravel(), points)
+    return points.reshape(*angle.shape, 3)
+
+
+def _center(center: object) -> tuple[Range, Range, Range]:
+    if not isinstance(center, list | tuple | np.ndarray) or len(cast("Sequence[object]", center)) != 3:
+        raise ValueError(f"circle center must have three coordinates, got {center!r}")
+    listed = cast("Sequence[Any]", center)
+    bounds = [end for coordinate in listed for end in (coordinate if is_pair(coordinate) else (coordinate,))]
+    if not all(isinstance(end, numbers.Real) for end in bounds):
+        raise ValueError(f"circle center must be three numbers or pairs [low, high], got {center!r}")
+    if not all(math.isfinite(end) for end in bounds):
+        raise ValueError(f"circle center must be finite, got {center!r}")
+    x, y, z = (as_range("circle center", coordinate, finite) for coordinate in listed)
+    return x, y, z
+
+
+def _phase(phase: object) -> float | str:
+    if not isinstance(phase, str):
+        return as_phase(phase)
+    if phase != "random":
+        raise ValueError(f'circle phase must be an angle in rad or "random", got {phase!r}')
+    return phase
+
+
+def _is_random(name: str, value: Any) -> bool:
+    if name == "center":
+        return any(isinstance(coordinate, tuple) for coordinate in value)
+    return isinstance(value, tuple) or value == "random"
+
+
+def _listed(value: Any) -> Any:
+    return [_listed(entry) for entry in cast("Sequence[Any]", value)] if isinstance(value, tuple) else value
+
+
+def as_phase(phase: object) -> float:
+    """A phase [rad] as a float; ValueError unless it is a finite number."""
+    if isinstance(phase, bool) or not isinstance(phase, numbers.Real):
+        raise ValueError(f"phase must be an angle in rad, got {phase!r}")
+    if not math.isfinite(phase):
+        raise ValueError(f"phase must be finite, got {phase!r}")
+    # The target needs the angle alone; whole turns would cost it digits.
+    return math.remainder(phase, 2.0 * math.pi) if abs(float(phase)) > 1e3 else float(phase)
+
+
+def as_circle(circle: object) -> Circle:
+    """A circle from None (the paper's), a dict of its fields, or a Circle."""
+    if circle is None:
+        return Circle()
+    if isinstance(circle, Circle):
+        return circle
+    if isinstance(circle, Mapping):
+        return Circle.from_dict(cast("Mapping[str, Any]", circle))
+    raise ValueError(f"circle must be a dict of its fields or None, got {circle!r}")
+
+
+def check_reachable(arm: ArmParameters, elbows: Sequence[int], circle: Circle) -> None:
+    """Raises ValueError, with the distance missing, when a point of the path is out of the hand's reach.
+
+    Covers every circle that may be drawn. Where lengths are random too, give the arm with the shortest ones.
+    """
+    points = _extreme_points(circle)
+    shortfall = reach_shortfall(arm, elbows, points)
+    worst = int(shortfall.argmax())
+    if shortfall[worst] > 0.0:
+        point = tuple(round(float(value), 4) for value in points[worst])
+        what = "circle" if circle.shape == "circle" else "path"
+        raise ValueError(
+            f"{what} must lie within the hand's reach, got the point {point} {shortfall[worst]:.4g} m outside"
+        )
+
+
+def _extreme_points(circle: Circle) -> Array:
+    """Points (m, 3) that are out of reach whenever a point of any circle that may be drawn is.
+
+    Outward the shortfall is convex in the point, and the point affine in the centre (in the radial plane: in its height
+    and its distance from the axis, itself convex), so that the worst centre is a corner of its box; the worst radius is
+    the largest, because circles and eights are symmetric about their centre. A hole around the base is not convex: the
+    last point stands for it, the nearest one of a box around all circles, which may refuse a set that just misses it.
+    """
+    # No wave of the path goes by with fewer than 45 samples.
+    angle = np.linspace(0.0, 2.0 * np.pi, 1 + 45 * max(8, circle.path_rows // 2))
+    if not {"center", "radius", "plane"} & set(circle.drawn):
+        return circle.position(angle)
+    bounds, radius = [ends(coordinate) for coordinate in circle.center], ends(circle.radius)[-1]
+    corners = [
+        replace(circle, center=center, radius=radius, plane=plane).position(angle)
+        for center in itertools.product(*bounds)
+        for plane in circle.planes
+    ]
+    spread = radius * np.array([any(axis in ("xyz" if p == "radial" else p) for p in circle.planes) for axis in "xyz"])
+    nearest = np.clip(0.0, [low for low, *_ in bounds] - spread, [high for *_, high in bounds] + spread)
+    return np.concatenate([*corners, nearest[None]])

@@ -1,0 +1,270 @@
+"""B episodes side by side: the one engine under the single and the batched environment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from elbow_gym import kernel
+from elbow_gym.kinematics import inverse_kinematics
+from elbow_gym.parameters import Array, check_entries
+from elbow_gym.simulator import Simulator
+from elbow_gym.task import observation as task
+from elbow_gym.task.actuation_and_sensing import Extras
+from elbow_gym.task.arm_batch import Population
+from elbow_gym.task.circle import Circle, check_reachable
+from elbow_gym.task.settings import Settings
+from elbow_gym.task.targets import Targets
+
+RESET_OPTIONS = ("state", "phase", "circle", "parameters")
+STATE_ENTRIES = ("q", "q_dot", "current", "temperature_rise")
+# The last figure is the reward itself.
+INFO_FIGURES = kernel.FIGURES[:-1]
+
+
+class Outcome(NamedTuple):
+    """What a control step gives, one entry per arm."""
+
+    observation: NDArray[np.float32]
+    reward: Array
+    terminated: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+    info: dict[str, Any]
+
+
+class Episodes:
+    """Simulator, targets, parameters and clocks of B arms under one `Settings`.
+
+    Args:
+        settings: the environment's arguments.
+        num_envs: B.
+        num_threads: see `Simulator`.
+    """
+
+    def __init__(self, settings: Settings, num_envs: int = 1, num_threads: int = 1) -> None:
+        self.settings = settings
+        self.arm = settings.parsed_arm
+        self.circle = settings.parsed_circle
+        """What the targets' circles are drawn from."""
+        conditions = settings.conditions
+        self.simulator = Simulator(
+            self.arm,
+            settings.elbow_joints,
+            num_envs,
+            timestep=settings.control_period / settings.n_substeps,
+            num_threads=num_threads,
+            **{field.name: getattr(conditions, field.name) for field in fields(conditions)},
+        )
+        self.num_envs = num_envs
+        self.tracking_weight = float(settings.tracking_weight)
+        self.energy_weight = float(settings.energy_weight)
+        self.pose = self.simulator.on_table(self.arm.nominal_pose)[0]
+        """Start pose [rad], (n,): the nominal one, on the elbows' plane. Observed angles count from it."""
+        self.population = Population(self.arm, conditions, settings.randomization, num_envs)
+        self.targets = Targets(self.circle, num_envs, settings.control_period)
+        self.extras = Extras(settings, self.simulator, self.population)
+        self.layout = task.ObservationLayout(self.arm.n_joints, self.extras.sizes)
+        self._n_substeps, self._horizon = settings.n_substeps, settings.horizon
+        if settings.start == "on_target" and not self.circle.random:
+            inverse_kinematics(self.arm, self.pose, self.circle.position(np.linspace(0.0, 2.0 * np.pi, 73)))
+        self._steps = np.zeros(num_envs, dtype=np.int64)
+        self._spent = np.zeros(num_envs)
+
+    @property
+    def highest_action(self) -> float:
+        """Largest entry of an action, in the action's unit."""
+        return 1.0 if self.settings.action_unit == "fraction" else float(self.settings.voltage_limit)
+
+    @property
+    def volts_per_action(self) -> float:
+        """Terminal voltage per unit of action at the nominal supply voltage [V]."""
+        return float(self.settings.voltage_limit) / self.highest_action
+
+    def target(self) -> Array:
+        """The targets' positions now [m], (B, 3)."""
+        return self.targets.position(self.angle())
+
+    def reset(
+        self,
+        generators: Sequence[np.random.Generator],
+        mask: NDArray[np.bool_] | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Starts new episodes in the arms of `mask` (all when None), each drawing from its own generator.
+
+        Options: `state`, a dict of q [rad] and, if wanted, q_dot [rad/s], current [A] and temperature_rise [K]; `phase`
+        [rad]; `circle`, a dict of `Circle` fields instead of the environment's; `parameters`, a dict of values instead
+        of drawn ones. Raises ValueError naming the option, with everything but the generators as it was.
+        """
+        options = {} if options is None else options
+        unknown = sorted(set(options) - set(RESET_OPTIONS))
+        if unknown:
+            raise ValueError(f"options must have only the entries {list(RESET_OPTIONS)}, got {unknown[0]!r}")
+        chosen = np.flatnonzero(np.ones(self.num_envs, dtype=np.bool_) if mask is None else mask)
+        state = given_state(options.get("state"))
+        circle = self._given_circle(options.get("circle"))
+        before = self.population.copy(), self.simulator.parameters(chosen)
+        try:
+            drawing = [generators[int(i)] for i in chosen]
+            self._draw_arms(drawing, chosen, options.get("parameters"))
+            if state is not None:
+                self.simulator.check_state(**state, mask=mask)
+            circles = self.targets.draw(circle, drawing, options.get("phase"))
+            self.targets.check(circles)
+            if state is None:
+                state = {"q": self._draw_pose(drawing, circles, chosen)}
+            self.simulator.reset(**state, mask=mask)
+        except ValueError:
+            self.population.values = before[0]
+            self.simulator.set_parameters(chosen, before[1])
+            raise
+        self.targets.put(chosen, circles)
+        self.extras.reset(chosen, drawing)
+        self._steps[chosen] = 0
+        self._spent[chosen] = 0.0
+
+    def _draw_arms(self, generators: Sequence[np.random.Generator], chosen: NDArray[np.int64], given: Any) -> None:
+        if given is None and not self.population.randomization.ranges and not self.population.changed:
+            return
+        values = self.population.draw(generators, given)
+        self.extras.check(values)
+        rows = self.population.put(chosen, values)
+        if given is not None and "length" in given:
+            for arm in self.population.arms(chosen):
+                check_reachable(arm, self.settings.elbow_joints, self.circle)
+        self.simulator.set_parameters(chosen, rows)
+
+    def _given_circle(self, given: object) -> Circle:
+        if given is None:
+            return self.circle
+        if not isinstance(given, Mapping):
+            raise ValueError(f"options['circle'] must be a dict of circle fields, got {given!r}")
+        circle = Circle.from_dict({**self.circle.to_dict(), **cast("Mapping[str, Any]", given)})
+        check_reachable(self.arm, self.settings.elbow_joints, circle)
+        return circle
+
+    def _draw_pose(
+        self, generators: Sequence[np.random.Generator], circles: Sequence[Circle], chosen: NDArray[np.int64]
+    ) -> Array:
+        noise, moved = self.settings.start_noise, "length" in self.settings.randomization.ranges
+        moved = moved or self.population.changed
+        q = np.tile(self.pose, (self.num_envs, 1))
+        if moved:
+            q = self.simulator.on_table(q)
+        if self.settings.start == "on_target":
+            arms = self.population.arms(chosen) if moved else [self.arm] * len(chosen)
+            for i, arm, circle in zip(chosen, arms, circles, strict=True):
+                q[i] = inverse_kinematics(arm, q[i], circle.position(float(circle.phase)))[0]
+        if noise > 0.0:
+            q[chosen] += noise * np.stack([generator.standard_normal(self.arm.n_joints) for generator in generators])
+            q = self.simulator.on_table(q)
+        return q
+
+    def step(self, action: Array, waiting: NDArray[np.bool_] | None = None) -> Outcome:
+        """One control period under `action`, held and clipped to the supply voltage.
+
+        The action is in its unit, contiguous float64 (B, n). Arms that wait for their reset draw no noise.
+
+        Raises ValueError, with the state untouched, when an action is not a number.
+        """
+        voltage = self.extras.voltage(action)
+        self._steps += 1
+        settings = self.settings
+        price = task.Price(self.tracking_weight, self.energy_weight, settings.control_frequency, settings.regeneration)
+        sight, look = self._looking(price)
+        invalid = self.simulator.advance(voltage, self._n_substeps, look)
+        self.extras.see(self.layout, sight.observation, waiting)
+        terminated = np.zeros(self.num_envs, dtype=np.bool_)
+        truncated = self._steps >= self._horizon
+        if invalid:
+            terminated = ~self.simulator.valid
+            self._charge_the_rest(terminated, sight)
+            truncated &= ~terminated
+        info = self.info(sight, voltage)
+        return Outcome(sight.observation, sight.figure("reward"), terminated, truncated, info)
+
+    def _charge_the_rest(self, terminated: NDArray[np.bool_], sight: task.Sight) -> None:
+        """Ending early never pays: the remaining time costs the worst that the observation's bounds allow."""
+        bound = self.layout.high * self.layout.scale
+        worst_error = np.linalg.norm(bound[self.layout.slices["hand_error"]])
+        worst_power = self.settings.voltage_limit * bound[self.layout.slices["current"]].sum()
+        rest = np.maximum(self.settings.horizon - self._steps + 1, 1)[terminated]
+        tracking = -self.tracking_weight * (worst_error * rest)
+        sight.figure("reward_tracking")[terminated] = tracking
+        sight.figure("reward_energy")[terminated] = -self.energy_weight * (worst_power * rest)
+        fused = [
+            kernel.fused(-worst_power * left, self.energy_weight, term)
+            for left, term in zip(rest, tracking, strict=True)
+        ]
+        sight.figure("reward")[terminated] = fused
+
+    def angle(self) -> Array:
+        """Each target's angle on its circle now [rad], (B,)."""
+        return self.targets.angle(self._steps)
+
+    def _looking(self, price: task.Price) -> tuple[task.Sight, Callable[[int, int], None]]:
+        target = self.targets.after(self._steps)
+        return task.looking(self.layout, self.simulator, self.pose, target, price, self._spent)
+
+    def look(self, resting: NDArray[np.bool_] | None = None) -> task.Sight:
+        """What is seen of every arm now, between control steps: power and rewards are zero.
+
+        Arms of the mask `resting` draw no noise, since they have not been reset.
+        """
+        sight, look = self._looking(task.Price(0.0, 0.0, 0.0, self.settings.regeneration))
+        look(0, self.num_envs)
+        self.extras.see(self.layout, sight.observation, resting)
+        return sight
+
+    def info(self, sight: task.Sight, voltage: Array | None = None) -> dict[str, Any]:
+        """Fresh arrays of the step's figures, one row per arm; without a voltage, of a reset: also what was drawn."""
+        info: dict[str, Any] = dict(zip(INFO_FIGURES, sight.figures, strict=False))
+        info["voltage"] = np.zeros((self.num_envs, self.arm.n_joints)) if voltage is None else voltage
+        info["elbow_force"] = self.simulator.elbow_force.copy()
+        info.update(self.extras.info())
+        if voltage is None:
+            if self.population.randomization.ranges or self.population.changed:
+                info["parameters"] = self.population.copy()
+            if self.circle.random:
+                info["circle"] = self.targets.figures()
+        return info
+
+    def get_state(self) -> dict[str, Any]:
+        """A copy of everything that runs on but the generators."""
+        own = {"steps": self._steps.copy(), "spent": self._spent.copy()}
+        parts = {"targets": self.targets.get_state(), "parameters": self.population.copy()}
+        return {"simulator": self.simulator.get_state(), **parts, "queue": self.extras.queue.copy(), **own}
+
+    def set_state(self, state: Mapping[str, Any], generators: Sequence[np.random.Generator]) -> None:
+        """Takes a state of `get_state` from episodes of the same settings and size, and each arm's generator."""
+        own = {"steps": self._steps, "spent": self._spent, "queue": self.extras.queue}
+        for name in (*own, "simulator", "targets", "parameters"):
+            if name not in state:
+                raise ValueError(f"state must have the entry {name!r}, got {sorted(state)}")
+        for name, array in own.items():
+            if np.shape(state[name]) != array.shape:
+                raise ValueError(f"state[{name!r}] must have shape {array.shape}, got {np.shape(state[name])}")
+        self.simulator.set_state(state["simulator"])
+        self.targets.set_state(state["targets"])
+        everyone = np.arange(self.num_envs)
+        self.simulator.set_parameters(everyone, self.population.put(everyone, state["parameters"]))
+        for name, array in own.items():
+            array[...] = state[name]
+        self.extras.listen(everyone, generators)
+
+
+def given_state(state: object) -> dict[str, Any] | None:
+    """The reset option `state` with its names checked."""
+    if state is None:
+        return None
+    if not isinstance(state, Mapping):
+        raise ValueError(f"options['state'] must be a dict, got {state!r}")
+    plain = cast("Mapping[str, Any]", state)
+    check_entries(plain, set(STATE_ENTRIES), "options['state']")
+    if "q" not in plain:
+        raise ValueError(f"options['state'] must have the entry 'q', got {sorted(plain)}")
+    return dict(plain)

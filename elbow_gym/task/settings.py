@@ -1,0 +1,147 @@
+"""What an environment is asked for: one frozen dataclass, validated once, shared by the single and the batched form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
+
+from elbow_gym.parameters import ArmParameters, as_arm, as_elbows, non_negative, positive
+from elbow_gym.simulation.options import TABLE_TIMESTEP, Conditions
+from elbow_gym.table import TableParameters, as_table
+from elbow_gym.task.circle import Circle, as_circle, check_reachable
+from elbow_gym.task.randomization import Randomization
+
+ACTION_UNITS = ("fraction", "volt")
+DEFAULT_TIMESTEP = 0.002
+STARTS = ("paper", "on_target")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Arguments of the environments. Raises ValueError naming the argument, the rule and the value."""
+
+    elbows: int | tuple[int, ...] = 2
+    """0, 1, 2 as in the paper (joints (), (4,), (4, 7)), or joint numbers held at z = 0."""
+    arm: str | ArmParameters | Mapping[str, Any] = "paper"
+    """Preset name, an ArmParameters, or its JSON dict."""
+    control_frequency: float = 50.0
+    """How often an action is read [Hz]; it is held in between."""
+    timestep: float | None = None
+    """Longest RK4 step [s], divided so that a whole number fits one control period; 0.002 s, with a table 0.001 s."""
+    duration: float = 5.0
+    """Episode length [s]."""
+    voltage_limit: float = 24.0
+    """Supply voltage of every motor [V]."""
+    action_unit: str = "fraction"
+    """"fraction" of the supply voltage in [-1, 1], or "volt"."""
+    start: str = "paper"
+    """"paper": the arm's nominal pose; "on_target": the pose whose hand is on the circle."""
+    start_noise: float = 0.02
+    """Standard deviation of the start pose [rad], projected onto the elbows' plane."""
+    circle: Mapping[str, Any] | Circle | None = None
+    """Dict of `Circle` fields, the paper's where one is missing."""
+    tracking_weight: float = 1.0
+    """Reward per metre of tracking error [1/m]."""
+    energy_weight: float = 0.001
+    """Reward per watt of electrical power [1/W]."""
+    regeneration: bool = True
+    """Whether negative electrical power is credited, and taken back by the supply."""
+    table: bool | Mapping[str, Any] | TableParameters = False
+    """A compliant table under joints 3..n and the hand: True, or a dict of `TableParameters` fields."""
+    elbow_friction: float = 0.0
+    """Coulomb's coefficient of rigid elbows on the table, where they push [-]."""
+    gear_coulomb_friction: float | None = None
+    """Coulomb friction of every gear, at the motor shaft [N m]; the arm's own when None."""
+    heat: bool = False
+    """Whether windings warm up, and their resistance with them."""
+    supply_resistance: float = 0.0
+    """Inside the motors' common supply [ohm], whose voltage it makes sag."""
+    payload: float = 0.0
+    """Mass at the hand [kg]."""
+    randomize: Mapping[str, Any] | None = None
+    """Dict of ranges that `Randomization` draws from at each reset."""
+
+    def __post_init__(self) -> None:
+        if self.timestep is None:
+            object.__setattr__(self, "timestep", DEFAULT_TIMESTEP if self.table is False else TABLE_TIMESTEP)
+        for name in ("control_frequency", "timestep", "duration", "voltage_limit"):
+            positive(name, getattr(self, name))
+        for name in ("start_noise", "tracking_weight", "energy_weight"):
+            non_negative(name, getattr(self, name))
+        for name, allowed in (("action_unit", ACTION_UNITS), ("start", STARTS)):
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} must be one of {allowed}, got {getattr(self, name)!r}")
+        if not math.isfinite(self.duration * self.control_frequency):
+            raise ValueError(f"duration must be a countable number of control periods, got {self.duration}")
+        if self.horizon < 1:
+            raise ValueError(
+                f"duration must be at least one control period ({1 / self.control_frequency:g} s), got {self.duration}"
+            )
+        check_reachable(self._shortest_arm(), self.elbow_joints, self.parsed_circle)
+        _ = self.conditions
+
+    @cached_property
+    def parsed_arm(self) -> ArmParameters:
+        """The arm that `arm` names."""
+        arm = as_arm(self.arm)
+        if self.gear_coulomb_friction is None:
+            return arm
+        friction = non_negative("gear_coulomb_friction", self.gear_coulomb_friction)
+        return replace(arm, motors=tuple(replace(motor, gear_coulomb_friction=friction) for motor in arm.motors))
+
+    def _shortest_arm(self) -> ArmParameters:
+        shortest = self.randomization.lowest("length")
+        links = (replace(link, length=shortest * link.length) for link in self.parsed_arm.links)
+        return self.parsed_arm if shortest == 1.0 else replace(self.parsed_arm, links=tuple(links))
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """What the arm works under beyond the paper's model."""
+        return Conditions(
+            payload=self.payload,
+            table=as_table(self.table),
+            elbow_friction=self.elbow_friction,
+            heat=self.heat,
+            supply_voltage=self.voltage_limit,
+            supply_resistance=self.supply_resistance,
+            regeneration=self.regeneration,
+        )
+
+    @cached_property
+    def randomization(self) -> Randomization:
+        """What is drawn at each reset."""
+        return Randomization(self.randomize)
+
+    @cached_property
+    def parsed_circle(self) -> Circle:
+        """The circle that `circle` describes."""
+        return as_circle(self.circle)
+
+    @cached_property
+    def elbow_joints(self) -> tuple[int, ...]:
+        """Joint numbers of the elbows, ascending."""
+        return as_elbows(self.elbows, self.parsed_arm.n_joints)
+
+    @property
+    def control_period(self) -> float:
+        """Time between two actions [s]."""
+        return 1.0 / self.control_frequency
+
+    @property
+    def n_substeps(self) -> int:
+        """RK4 steps in a control period."""
+        # A hair is taken off so that 0.02 s / 0.002 s is 10 whatever its rounding.
+        return max(1, math.ceil(self.control_period / float(self.timestep or DEFAULT_TIMESTEP) - 1e-9))
+
+    @property
+    def horizon(self) -> int:
+        """Control periods in an episode."""
+        return round(self.duration * self.control_frequency)
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The arguments by name, as they were given."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}

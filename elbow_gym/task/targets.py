@@ -1,0 +1,115 @@
+"""Where the targets of B arms are: each arm's circle or other path, and how fast its target runs along it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from elbow_gym.parameters import Array
+from elbow_gym.task.circle import Circle, as_phase
+from elbow_gym.task.observation import LOOKAHEAD, Target
+
+
+class Targets:
+    """One target per arm.
+
+    Args:
+        circle: what is drawn from at each reset; the same for all arms unless it is random.
+        num_envs: B.
+        control_period: time between two steps [s].
+    """
+
+    def __init__(self, circle: Circle, num_envs: int, control_period: float) -> None:
+        self._period = control_period
+        first = circle.draw(np.random.default_rng(0))
+        self.circles: list[Circle] = [first] * num_envs
+        """Each arm's circle, as drawn at its last reset."""
+        self._path = np.repeat(first.path[None], num_envs, axis=0)
+        self._rate = np.full(num_envs, first.rate)
+        self._phase = np.zeros(num_envs)
+        self._pace()
+        self._alike = not circle.random
+
+    def _pace(self) -> None:
+        """What follows from the rates: how far the targets turn in a control period, and to the look-ahead [rad]."""
+        self._turn, self._lookahead = self._rate * self._period, self._rate * LOOKAHEAD
+
+    def draw(self, circle: Circle, generators: Sequence[np.random.Generator], phase: object = None) -> list[Circle]:
+        """New circles, each by its arm's generator, which start at `phase` [rad] if it is given.
+
+        A given phase is not drawn, whatever else is.
+        """
+        if phase is not None:
+            circle = Circle.from_dict({**circle.to_dict(), "phase": as_phase(phase)})
+        return [circle.draw(generator) for generator in generators]
+
+    def check(self, circles: Sequence[Circle]) -> None:
+        """ValueError when circles do not fit into the batch: all paths have the same number of rows."""
+        rows = self._path.shape[1]
+        for circle in circles:
+            if circle.path_rows != rows:
+                raise ValueError(f"circle must have a shape of {rows} path rows, got one of {circle.path_rows}")
+
+    def put(self, chosen: NDArray[np.int64], circles: Sequence[Circle]) -> None:
+        """Gives the chosen arms new circles, which `check` has passed."""
+        for i, circle in zip(chosen, circles, strict=True):
+            self._alike = self._alike and bool((circle.path == self.circles[0].path).all())
+            self.circles[int(i)] = circle
+            self._path[i], self._rate[i], self._phase[i] = circle.path, circle.rate, float(circle.phase)
+        self._pace()
+
+    def angle(self, steps: NDArray[np.int64]) -> Array:
+        """Angle of each target on its path after `steps` control periods [rad], (B,)."""
+        return self._phase + self._turn * steps
+
+    def after(self, steps: NDArray[np.int64]) -> Target:
+        """What the hands should follow after `steps` control periods."""
+        return Target(self._path, self.angle(steps), self._lookahead)
+
+    def position(self, angle: Array) -> Array:
+        """Each target's position at its angle [m], (B, 3)."""
+        if self._alike:
+            return self.circles[0].position(angle)
+        return np.stack([circle.position(one) for circle, one in zip(self.circles, angle, strict=True)])
+
+    def velocity(self, angle: Array) -> Array:
+        """Each target's velocity at its angle [m/s], (B, 3)."""
+        if self._alike and (self._rate == self._rate[0]).all():
+            return self.circles[0].velocity(angle)
+        return np.stack([circle.velocity(one) for circle, one in zip(self.circles, angle, strict=True)])
+
+    @property
+    def rate(self) -> Array:
+        """Signed rate of each target's angle [rad/s], (B,)."""
+        return self._rate.copy()
+
+    def get_state(self) -> dict[str, Any]:
+        """A copy of everything that runs on."""
+        own = {"path": self._path, "rate": self._rate, "phase": self._phase}
+        return {**{name: array.copy() for name, array in own.items()}, "circles": list(self.circles)}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Takes a state of `get_state`. ValueError when it is of another number of arms or shape of path."""
+        own = {"path": self._path, "rate": self._rate, "phase": self._phase}
+        for name, array in own.items():
+            if name not in state or np.shape(state[name]) != array.shape:
+                got = np.shape(state[name]) if name in state else "nothing"
+                raise ValueError(f"state[{name!r}] must have shape {array.shape}, got {got}")
+        for name, array in own.items():
+            array[...] = state[name]
+        self._pace()
+        self.circles = list(state["circles"])
+        self._alike = bool((self._path == self._path[0]).all())
+
+    def figures(self) -> dict[str, Array]:
+        """Centre [m] (B, 3), radius [m], period [s], phase [rad] and signed rate [rad/s] of each circle, (B,)."""
+        return {
+            "center": self._path[:, 0].copy(),
+            "radius": np.array([circle.radius for circle in self.circles], dtype=np.float64),
+            "period": np.array([circle.period for circle in self.circles], dtype=np.float64),
+            "phase": self._phase.copy(),
+            "rate": self._rate.copy(),
+        }
