@@ -1,4 +1,4 @@
-"""How figures look: the same colour for the same controller or elbow count everywhere (Okabe and Ito's palette)."""
+"""Style of the figures: one colour for each controller and elbow count everywhere (Okabe and Ito's palette)."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class Curve:
     task: str
     seed: int
     columns: Mapping[str, Array]
-    """By name as in `agents.learning.callback.COLUMNS`, (evaluations,)."""
+    """Columns by name as in `agents.learning.evaluation.COLUMNS`, each of shape (evaluations,)."""
 
     def beats(self, goal: Goal) -> dict[str, float] | None:
         """Steps and seconds at the first evaluation that is below both figures of the PD; None when none is."""

@@ -110,8 +110,8 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | start | "paper" | "paper" or "on_target" |
     | start_noise | 0.02 | standard deviation of the start pose [rad] |
     | circle | None | dict of center, radius, period, plane, phase, direction, shape; ranges or "random" are drawn |
-    | tracking_weight | 1.0 | reward per metre of tracking error |
-    | energy_weight | 0.001 | reward per watt of electrical power |
+    | tracking_weight | 1.0 | cost per metre of tracking error |
+    | energy_weight | 0.001 | cost per watt of electrical power |
     | regeneration | True | whether negative electrical power is credited, and taken back by the supply |
     | table | False | a compliant table that cannot pull: True, or a dict of stiffness, dissipation, friction... |
     | elbow_friction | 0.0 | Coulomb's coefficient of rigid elbows, where they push |

@@ -1,1 +1,1 @@
-"""Trains policies: PPO, SAC, imitation."""
+"""Training of policies: PPO, SAC, imitation."""

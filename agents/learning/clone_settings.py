@@ -4,24 +4,33 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from agents.learning.settings import check_counts, check_shares
+
 
 @dataclass(frozen=True, kw_only=True)
 class CloneSettings:
-    """Imitation of the LQR on the optimal trajectory, by rounds of playing, labelling and fitting."""
+    """Settings of the imitation of the LQR on the optimal trajectory, by rounds of playing, labelling and fitting.
+
+    Raises ValueError naming the argument, the rule and the value.
+    """
 
     rounds: int = 45
-    """Episodes of every arm; after each the network is fitted to all that was seen so far."""
+    """Number of rounds; in each, every arm plays an episode and the network is fitted to all states so far."""
     num_envs: int = 64
-    """Arms side by side."""
+    """Number of arms that are simulated side by side."""
     teaching: float = 1.0 / 3.0
-    """Share of the rounds in which the teacher still drives some of the arms, ever fewer."""
+    """Share of the rounds in which the teacher drives some of the arms, fewer in each round [-], in (0, 1]."""
     noise: float = 0.02
-    """Standard deviation of what is added to every other arm's action, in units of the supply voltage."""
+    """Standard deviation of the noise on every other arm's actions, in units of the supply voltage."""
     gradient_steps: int = 200
-    """After every round."""
+    """Number of gradient steps after every round."""
     batch_size: int = 1024
-    """Samples per gradient step."""
+    """Number of samples in each gradient step."""
     learning_rate: float = 2e-3
-    """At the start; falls along half a cosine."""
+    """Learning rate at the start [-]; falls along half a cosine."""
     hidden: tuple[int, ...] = (128, 128)
-    """Widths of the tanh layers."""
+    """Number of units in each hidden layer, whose activation is tanh."""
+
+    def __post_init__(self) -> None:
+        check_counts(self, "rounds", "num_envs", "gradient_steps", "batch_size", "hidden")
+        check_shares(self, "teaching")

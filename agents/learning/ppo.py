@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.learning.settings import Activation, AlgorithmSettings
+from agents.learning.settings import Activation, AlgorithmSettings, check_counts, check_shares
 
 
 @dataclass(frozen=True, kw_only=True)
 class PPOSettings(AlgorithmSettings):
-    """Proximal policy optimisation, chosen for this arm."""
+    """Settings of proximal policy optimisation (PPO), found for this arm."""
 
     total_timesteps: int = 2_500_000
     num_envs: int = 128
@@ -20,35 +20,40 @@ class PPOSettings(AlgorithmSettings):
     hidden: tuple[int, ...] = (64, 64)
     activation: Activation = "silu"
     n_steps: int = 32
-    """Control periods per arm and update."""
+    """Time between two updates [control periods], counted on each arm."""
     batch_size: int = 1024
-    """Samples per gradient step."""
+    """Number of samples in each gradient step."""
     n_epochs: int = 6
-    """Passes over an update's samples."""
+    """Number of passes over the samples of an update."""
     gae_lambda: float = 0.95
-    """Of the generalised advantage estimate."""
+    """Decay of the generalised advantage estimate per control period [-], in (0, 1]."""
     clip_range: float = 0.2
-    """Largest change of an action's probability ratio."""
+    """Largest change of an action's probability ratio that an update gains by [-]."""
     ent_coef: float = 0.0
-    """Weight of the entropy bonus."""
+    """Weight of the entropy bonus in the loss [-]."""
     vf_coef: float = 0.5
-    """Weight of the value function's loss."""
+    """Weight of the value function's squared error in the loss [-]."""
     max_grad_norm: float = 0.5
-    """Gradients are clipped here."""
+    """Largest norm of a gradient [-]; longer ones are scaled down to it."""
     normalize_advantage: bool = True
-    """Per batch."""
+    """Whether the advantages of each batch are scaled to mean 0 and standard deviation 1."""
     adam_epsilon: float = 1e-5
-    """Adam's: gradients well below it move little."""
+    """Adam's epsilon [-]; parameters whose gradients are well below it move little."""
     target_kl: float | None = None
-    """An update ends early past this divergence; never when None."""
+    """Kullback-Leibler divergence past which an update ends early [nat]; never when None."""
     log_std_init: float = -1.5
-    """Natural logarithm of the actions' first standard deviation, in units of the supply voltage."""
+    """Natural logarithm of the actions' standard deviation at the start, in units of the supply voltage."""
     log_std_final: float | None = -3.5
-    """What it falls to, linearly over the training; learned when None. Learned, it falls as fast as noise costs power,
-    before the posture has been found."""
+    """Natural logarithm of the actions' standard deviation at the end, approached linearly; learned when None.
+    A learned deviation falls as fast as noise costs power, before the posture has been found."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_counts(self, "n_steps", "batch_size", "n_epochs")
+        check_shares(self, "gae_lambda")
 
     def follow_plan(self, model: Any, done: float) -> None:
-        """The actions' log_std is linear from `log_std_init` to `log_std_final`, if there is one."""
+        """Sets the actions' log_std, linear from `log_std_init` to `log_std_final`, unless the latter is None."""
         if self.log_std_final is not None:
             log_std = self.log_std_init + (self.log_std_final - self.log_std_init) * min(1.0, done)
             model.policy.log_std.requires_grad_(False)
@@ -56,13 +61,13 @@ class PPOSettings(AlgorithmSettings):
 
     @property
     def model_class(self) -> Any:
-        """Stable-Baselines3's PPO."""
+        """Class of Stable-Baselines3's PPO."""
         from stable_baselines3 import PPO
 
         return PPO
 
     def model(self, env: Any, seed: int, log: Path) -> Any:
-        """Stable-Baselines3's PPO."""
+        """Stable-Baselines3's PPO on the CPU. Arguments of `AlgorithmSettings.model`."""
         arguments = self._common(env, seed, log, "vf")
         arguments["policy_kwargs"]["log_std_init"] = self.log_std_init
         arguments["policy_kwargs"]["optimizer_kwargs"]["eps"] = self.adam_epsilon

@@ -1,4 +1,4 @@
-"""The algorithms by name, and the settings that were found for each task."""
+"""Algorithms by name, and the settings that were found for each task."""
 
 from __future__ import annotations
 
@@ -63,11 +63,11 @@ DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
     # Under narrower noise than this the second half of the training undoes what the first has saved.
     ("ppo", "random"): replace(_PPO_BRACED, total_timesteps=5_000_000, hidden=(128, 128), log_std_final=-3.0),
 }
-"""Settings by algorithm and task, where they are not the algorithm's general ones."""
+"""Settings by algorithm and task, where they differ from the algorithm's general ones."""
 
 
 def default_settings(algorithm: str, task: str) -> AlgorithmSettings:
-    """The settings of an algorithm for a task; for a task without an entry of its own, the algorithm's general ones.
+    """Settings of an algorithm for a task; the algorithm's general ones for a task without an entry.
 
     Raises:
         ValueError: there is no such algorithm.

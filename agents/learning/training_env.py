@@ -1,4 +1,4 @@
-"""The training's environment: episodes that do not all end together, and means of what the reward is made of."""
+"""Environment of a training: episodes that end at different times, and means of the reward's terms."""
 
 from __future__ import annotations
 
@@ -11,25 +11,30 @@ from numpy.typing import NDArray
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 METERS = {"reward_tracking": "-", "reward_energy": "-", "tracking_error": "m", "electrical_power": "W"}
-"""Entries of the step's info, and their units, of which the means over all arms and control periods are kept."""
+"""Units of those entries of the step's info whose means over all arms and control periods are kept."""
 
 
 class MeteredVectorEnv(ElbowArmVectorEnv):
-    """`ElbowArmVectorEnv` with autoreset "SameStep" that sums up `METERS`. Takes its arguments."""
+    """`ElbowArmVectorEnv` with autoreset "SameStep" that sums up `METERS`.
+
+    Args:
+        num_envs: number of arms.
+        arguments: those of `ElbowArmVectorEnv`.
+    """
 
     def __init__(self, num_envs: int = 1, **arguments: Any) -> None:
         super().__init__(num_envs, **arguments, autoreset_mode="SameStep")
         self._sums = dict.fromkeys(METERS, 0.0)
         self.staggered = False
-        """Whether a reset of all arms puts their first episodes' clocks at evenly spread times. Episodes are equally
-        long: otherwise all arms of a rollout show the same part of the task, and an update forgets the others."""
+        """Whether a reset of all arms spreads the clocks of their first episodes evenly. Episodes are equally long:
+        otherwise all arms of a rollout show the same part of the task, and an update forgets the others."""
         self.metered_periods = 0
-        """Control periods since the last reading, of all arms together."""
+        """Number of control periods since the last reading, summed over all arms."""
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """As `ElbowArmVectorEnv.reset`; when `staggered`, arms of higher number have a shorter first episode."""
+        """Resets as `ElbowArmVectorEnv.reset`; when `staggered`, arms of higher number have a shorter first episode."""
         observation, info = super().reset(seed=seed, options=options)
         if self.staggered and "reset_mask" not in (options or {}):
             state = self.get_state()
@@ -41,7 +46,7 @@ class MeteredVectorEnv(ElbowArmVectorEnv):
     def step(
         self, actions: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """One control period of every arm."""
+        """Makes one control period of every arm. Arguments and results of `ElbowArmVectorEnv.step`."""
         outcome = super().step(actions)
         info = outcome[4]
         for name in METERS:
@@ -53,7 +58,7 @@ class MeteredVectorEnv(ElbowArmVectorEnv):
         return outcome
 
     def read_meters(self) -> dict[str, float]:
-        """Means per control period since the last call; nothing when no step was made."""
+        """Means of `METERS` per control period since the last call; empty when no step was made."""
         means = (
             {name: total / self.metered_periods for name, total in self._sums.items()} if self.metered_periods else {}
         )

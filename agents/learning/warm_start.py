@@ -1,4 +1,4 @@
-"""What a training starts from: a policy's weights, or a controller that works, its data and its imitation."""
+"""Start of a training: a policy's weights, or data from a controller that works and their imitation."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from elbow_gym.vector_env import ElbowArmVectorEnv
 
 
 class Demonstrations(NamedTuple):
-    """What a controller saw and did, control period by control period."""
+    """Observations of a controller and its actions, control period by control period."""
 
     observations: NDArray[np.float32]
-    """(periods, arms, size)."""
+    """Observations of the environment [-], shape (periods, arms, size)."""
     actions: NDArray[np.float32]
-    """In units of the actor's output, (periods, arms, n)."""
+    """Actions in units of the actor's output [-], in [-1, 1], shape (periods, arms, n)."""
 
 
 def take_over(model: Any, policy: Policy) -> None:
@@ -51,13 +51,13 @@ def fill(
 
     Args:
         model: Stable-Baselines3's SAC with its environment.
-        sac: its settings.
+        sac: settings of the SAC.
         env: the batched environment under the model's.
-        seed: of the noise.
-        progress: called with the control periods done.
+        seed: seed of the noise.
+        progress: called with the number of control periods so far.
 
     Returns:
-        What computed torque saw and what it would have done without the noise; nothing where the data are another's.
+        Observations of computed torque and its actions without the noise; empty with another `warm_start`.
     """
     rng = np.random.default_rng(seed)
     monitored = model.get_env()
@@ -92,14 +92,14 @@ def fill(
 
 
 def imitate(model: Any, shown: Demonstrations, steps: int, seed: int, batch_size: int = 512) -> None:
-    """Fits the mean of the actor of a `sac.agent.SAC` to demonstrations, by squared error; its copies go along.
+    """Fits the mean of the actor of a `sac.agent.SAC` to demonstrations by squared error, and its copies with it.
 
     Args:
         model: the SAC.
-        shown: at least one control period.
-        steps: gradient steps, at a rate that falls linearly from 0.002.
-        seed: of the batches.
-        batch_size: samples per gradient step.
+        shown: demonstrations of at least one control period.
+        steps: number of gradient steps, at a learning rate that falls linearly from 0.002.
+        seed: seed of the batches.
+        batch_size: number of samples in each gradient step.
     """
     import torch
 

@@ -44,9 +44,9 @@ class Settings:
     circle: Mapping[str, Any] | Circle | None = None
     """Dict of `Circle` fields, the paper's where one is missing."""
     tracking_weight: float = 1.0
-    """Reward per metre of tracking error [1/m]."""
+    """Cost per metre of tracking error [1/m]."""
     energy_weight: float = 0.001
-    """Reward per watt of electrical power [1/W]."""
+    """Cost per watt of electrical power [1/W]."""
     regeneration: bool = True
     """Whether negative electrical power is credited, and taken back by the supply."""
     table: bool | Mapping[str, Any] | TableParameters = False

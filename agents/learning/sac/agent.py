@@ -21,12 +21,13 @@ from agents.learning.sac.inputs import Foresight, Sharpened
 class CentredPolicy(SACPolicy):
     """Actor, twin `QuadraticCritics` and their targets, and two copies of the actor's mean that follow it.
 
-    The nearer is the centre of the critics' quadratic form. The farther is the average of the actors of the training's
-    last while, which does not follow the critics' every turn: it is what deterministic predictions are.
+    The nearer copy is the centre of the critics' quadratic form. The farther one is an average of the last actors,
+    which does not follow the critics' every turn; deterministic predictions are its actions.
 
     Args:
-        arguments: those of Stable-Baselines3's `SACPolicy`.
-        view: what the critics see of the observation; all of it, and nothing besides, when None.
+        positional: positional arguments of Stable-Baselines3's `SACPolicy`.
+        view: inputs of the critics from the observation; the observation alone when None.
+        arguments: further arguments of `SACPolicy`.
     """
 
     def __init__(self, *positional: Any, view: Sharpened | Foresight | None = None, **arguments: Any) -> None:
@@ -40,7 +41,7 @@ class CentredPolicy(SACPolicy):
         self.average = copy.deepcopy(self.center)
 
     def make_critic(self, features_extractor: Any = None) -> Any:
-        """Quadratic ones."""
+        """Twin critics that are quadratic in the action. `features_extractor` is not used."""
         del features_extractor
         hidden: Any = self.critic_kwargs["net_arch"]
         size, joints = (spaces.flatdim(space) for space in (self.observation_space, self.action_space))
@@ -53,45 +54,53 @@ class CentredPolicy(SACPolicy):
         return self.average(observation) if deterministic else self.actor(observation)
 
     def follow(self, center: float, average: float) -> None:
-        """Moves the centre and the average by these shares of their ways to the actor's mean."""
+        """Moves the two copies towards the actor's mean.
+
+        Args:
+            center: share of the way that the centre goes [-], in [0, 1].
+            average: share of the way that the average goes [-], in [0, 1].
+        """
         ahead = [parameter for layer in (self.actor.latent_pi, self.actor.mu) for parameter in layer.parameters()]
         _approach(self.center.parameters(), ahead, center)
         _approach(self.average.parameters(), ahead, average)
 
 
 class Batch(NamedTuple):
-    """B transitions."""
+    """B transitions of an arm with n joints, from the replay buffer."""
 
     observation: Tensor
+    """Observations before the action [-], shape (B, size)."""
     action: Tensor
+    """Actions in units of the actor's output [-], in [-1, 1], shape (B, n)."""
     reward: Tensor
-    """(B,)."""
+    """Rewards of the action [return], shape (B,)."""
     discount: Tensor
-    """Of what comes after; 0 where the episode ended, (B,)."""
+    """Discount factors of the next state's value [-], 0 where the episode terminated, shape (B,)."""
     after: Tensor
-    """The next observation."""
+    """Observations after the action [-], shape (B, size)."""
 
 
 class SAC(stable_baselines3.SAC):
-    """Soft actor-critic that knows what an action is worth near the action it would take anyway.
+    """Soft actor-critic whose critics are quadratic in the action, around a slow copy of the actor's mean.
 
-    A critic of any form has no cause to tell two voltages apart that are a volt from each other: their values differ
-    by less than it errs. One that is quadratic in the action has to fit its slope to all that was tried there, and the
-    actor climbs that slope no further than the curvature lets it.
+    Two voltages that are a volt apart have values that differ by less than the error of a critic of general form, which
+    does not tell them apart. A critic that is quadratic in the action fits one slope to all actions that were tried in
+    a state, and the actor climbs that slope no further than the curvature lets it.
 
-    A metre of tracking error outweighs a millimetre a million times in a squared loss, and the values of an arm that
-    has arrived drown in what is left of the errors on its way there: `huber_delta`.
+    In a squared loss a metre of tracking error weighs a million times more than a millimetre, so that errors on the way
+    to the circle hide the values of an arm that has arrived; past `huber_delta` the loss is linear.
 
     Args:
-        huber_delta: temporal-difference error from which on the critics' loss is linear, in units of the return;
-            the loss is squared throughout when None.
-        actor_rate: the actor's learning rate over the critics'.
-        center_tau: share by which the centre follows the actor at each gradient step.
-        average_tau: the same of the average, which is what deterministic predictions are.
-        critic_head_start: gradient steps before the actor's first.
-        proximity: weight of half the squared departure of the actor's mean from the centre, in its loss: a curvature
-            that holds it back wherever the critics know of none.
-        arguments: those of `stable_baselines3.SAC`.
+        positional: positional arguments of `stable_baselines3.SAC`.
+        huber_delta: temporal-difference error past which the critics' loss is linear [return]; squared throughout
+            when None.
+        actor_rate: learning rate of the actor as a multiple of the critics' [-].
+        center_tau: share of the way to the actor that the centre goes in each gradient step [-].
+        average_tau: share of the way to the actor that the average goes in each gradient step [-].
+        critic_head_start: number of gradient steps of the critics before the actor's first.
+        proximity: weight of half the squared distance between the actor's mean and the centre, in the actor's loss
+            [return]. It is a curvature that holds the actor back where the critics have none.
+        arguments: further arguments of `stable_baselines3.SAC`.
     """
 
     policy_aliases: ClassVar = {"MlpPolicy": CentredPolicy}
@@ -120,7 +129,12 @@ class SAC(stable_baselines3.SAC):
         return super()._setup_learn(*positional, **arguments)
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
-        """So many gradient steps of critics, weight of the entropy, actor, target critics, centre and average."""
+        """Makes gradient steps of the critics, the weight of the entropy, the actor and all copies that follow.
+
+        Args:
+            gradient_steps: number of gradient steps.
+            batch_size: number of samples in each of them.
+        """
         self.policy.set_training_mode(True)
         optimizers = [self.actor.optimizer, self.critic.optimizer]
         if self.ent_coef_optimizer is not None:
@@ -135,7 +149,7 @@ class SAC(stable_baselines3.SAC):
             self.logger.record(f"train/{name}", loss)
 
     def _batches(self, count: int, size: int) -> list[Batch]:
-        """Drawn at once: drawing costs as much as a forward pass."""
+        """`count` batches of `size` transitions, drawn at once: a draw costs as much as a forward pass."""
         # As in Stable-Baselines3: without a VecNormalize this hands out what was stored.
         data: Any = self.replay_buffer.sample(count * size, env=self._vec_normalize_env)  # pyright: ignore[reportOptionalMemberAccess]
         discount = (1.0 - data.dones) * (self.gamma if data.discounts is None else data.discounts)
@@ -143,7 +157,7 @@ class SAC(stable_baselines3.SAC):
         return [Batch(*parts) for parts in zip(*(part.split(size) for part in whole), strict=True)]
 
     def _step(self, batch: Batch) -> tuple[float, float]:
-        """One gradient step; the losses of critics and actor."""
+        """Makes one gradient step and returns the losses of the critics and the actor."""
         learning = self._n_updates >= self.critic_head_start
         self.policy.follow(self.center_tau, self.average_tau)
         ent_coef, center = self._ent_coef(), self.policy.center(batch.observation)
@@ -168,6 +182,7 @@ class SAC(stable_baselines3.SAC):
         return float(critic_loss.detach()), float(actor_loss.detach())
 
     def _target(self, batch: Batch, ent_coef: Tensor) -> Tensor:
+        """Values that the critics should have had [return], shape (B,)."""
         with torch.no_grad():
             action, log_prob = self.actor.action_log_prob(batch.after)
             quadratic: Any = self.critic_target(batch.after)
@@ -175,14 +190,17 @@ class SAC(stable_baselines3.SAC):
             return batch.reward + batch.discount * after
 
     def _loss(self, value: Tensor, target: Tensor) -> Tensor:
+        """Mean loss of values (B,) against their targets (B,)."""
         if self.huber_delta is None:
             return 0.5 * functional.mse_loss(value, target)
         return functional.huber_loss(value, target, delta=self.huber_delta)
 
     def _ent_coef(self) -> Tensor:
+        """Weight of the entropy [return/nat]."""
         return self.ent_coef_tensor if self.log_ent_coef is None else self.log_ent_coef.detach().exp()
 
     def _price_entropy(self, log_prob: Tensor) -> None:
+        """Makes a gradient step of the weight of the entropy, from log-probabilities of actions (B,)."""
         if self.ent_coef_optimizer is not None and self.log_ent_coef is not None:
             loss = -(self.log_ent_coef * (log_prob + float(self.target_entropy))).mean()
             _descend(self.ent_coef_optimizer, loss)
@@ -195,6 +213,7 @@ def _descend(optimizer: torch.optim.Optimizer, loss: Tensor) -> None:
 
 
 def _approach(behind: Iterable[Tensor], ahead: Iterable[Tensor], share: float) -> None:
+    """Moves tensors by a share of their ways to others of the same shapes."""
     with torch.no_grad():
         for one, other in zip(behind, ahead, strict=True):
             one.lerp_(other, share)

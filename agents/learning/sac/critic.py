@@ -14,29 +14,35 @@ from agents.learning.sac.inputs import Foresight, Sharpened
 
 
 class Quadratic(NamedTuple):
-    """Value of B states' actions by two critics: value + slope d - (curvature d^2 + |factors d|^2) / 2.
+    """Values of the actions of n joints in B states by two critics [return]: quadratic and concave in the action.
 
-    d is the departure of the action from the state's centre, in units of the actor's output. The value is concave: it
-    has one best action, and a step from the centre towards it is no longer than slope over curvature.
+        value + slope . d - (curvature . d^2 + |factors d|^2) / 2
+
+    d is the action less the state's centre, in units of the actor's output [-], shape (B, n). There is one best action,
+    and a step from the centre towards it is no longer than slope over curvature.
     """
 
     value: Tensor
-    """Of the centre, (2, B)."""
+    """Value of the centre [return], shape (2, B)."""
     slope: Tensor
-    """(2, B, n)."""
+    """Derivative of the value with respect to d at the centre [return], shape (2, B, n)."""
     curvature: Tensor
-    """Positive, (2, B, n)."""
+    """Curvature of the value along each joint alone [return], positive, shape (2, B, n)."""
     factors: Tensor
-    """What couples the joints, (2, B, rank, n)."""
+    """Factors of the curvature that couples the joints [return^(1/2)], shape (2, B, rank, n)."""
 
     def __call__(self, departure: Tensor) -> Tensor:
-        """Of actions that depart by (B, n), (2, B)."""
+        """Values of actions [return], shape (2, B).
+
+        Args:
+            departure: actions less the centres, in units of the actor's output [-], shape (B, n).
+        """
         own = ((self.slope - 0.5 * self.curvature * departure) * departure).sum(-1)
         coupled = (self.factors @ departure.unsqueeze(-1)).squeeze(-1).square().sum(-1)
         return self.value + own - 0.5 * coupled
 
     def detach(self) -> Quadratic:
-        """The same without its history."""
+        """A copy that takes no gradients."""
         return Quadratic(*(part.detach() for part in self))
 
 
@@ -44,10 +50,10 @@ class QuadraticCritics(nn.Module):
     """Two networks side by side from the observation to a `Quadratic` each.
 
     Args:
-        view: what the networks see of the observation.
-        n_actions: joints.
-        hidden: widths of the ReLU layers.
-        rank: of what couples the joints.
+        view: inputs of the networks from the observation.
+        n_actions: number of joints n.
+        hidden: number of units in each hidden layer, whose activation is ReLU.
+        rank: rank of the curvature that couples the joints.
     """
 
     optimizer: torch.optim.Optimizer
@@ -64,7 +70,11 @@ class QuadraticCritics(nn.Module):
             self.biases.append(nn.Parameter(torch.empty(2, 1, after).uniform_(-bound, bound)))
 
     def forward(self, observation: Tensor) -> Quadratic:
-        """Of B observations."""
+        """Values of the actions in B states.
+
+        Args:
+            observation: observations [-], shape (B, size).
+        """
         seen = self.view(observation)
         x = seen.expand(2, *seen.shape)
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
@@ -78,5 +88,5 @@ class QuadraticCritics(nn.Module):
         )
 
     def set_training_mode(self, mode: bool) -> None:
-        """What Stable-Baselines3 calls `train`."""
+        """Switches between training and evaluation, under the name that Stable-Baselines3 calls."""
         self.train(mode)

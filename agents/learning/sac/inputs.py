@@ -1,4 +1,4 @@
-"""What critics are shown besides the observation: where the hand is heading, and how long errors are."""
+"""Inputs of the critics beside the observation: errors of the hand to come, and the lengths of errors."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from elbow_gym.parameters import ArmParameters
 from elbow_gym.task.observation import LOOKAHEAD, ObservationLayout
 
 STRETCH = 50.0
-"""Values far below its inverse are made larger, far above it smaller."""
+"""Inverse of the scaled error around which `Sharpened` enlarges smaller ones and shrinks larger ones [-]."""
 GAIN = 3.0
-"""Of all that the networks see: larger inputs let them bend more sharply."""
+"""Factor of all inputs of the networks [-]; larger inputs let a network bend more sharply."""
 AHEAD = (0.05, 0.1, 0.2)
-"""Times at which the critics see where the hand would be [s]."""
+"""Times ahead at which the critics get the error that the hand would have [s]."""
 VELOCITY_SCALE = 2.5
-"""Of the hand against the target [m/s]."""
+"""Scale of the hand's velocity relative to the target [m/s]."""
 
 
 class Sharpened:
-    """The observation, and of some parts of it the length and the stretched entries, all times `GAIN`.
+    """The observation with the lengths and the stretched entries of some vectors in it, all times `GAIN`.
 
     Args:
-        n_observations: entries of the observation.
-        vectors: where parts stand whose length costs, such as an error. The value has a cone's tip where one vanishes,
-            which a network of some hundred units rounds off by centimetres.
+        n_observations: length of the observation [-].
+        vectors: places of vectors in it whose length costs, such as an error. The value has the tip of a cone where
+            one of them vanishes, which a network of some hundred units rounds off by centimetres.
     """
 
     def __init__(self, n_observations: int, vectors: Iterable[slice] = ()) -> None:
         self.vectors = tuple(vectors)
         self.size = n_observations + sum(1 + vector.stop - vector.start for vector in self.vectors)
-        """Of what it gives."""
+        """Length of the output vector [-]."""
 
     def __call__(self, observation: Tensor) -> Tensor:
-        """From (B, n_observations) to (B, size)."""
+        """Inputs of the networks [-], shape (B, size), from observations [-], shape (B, n_observations)."""
         vectors = [observation[:, vector] for vector in self.vectors]
         lengths = [vector.norm(dim=1, keepdim=True) for vector in vectors]
         stretched = [0.5 * torch.asinh(STRETCH * vector) for vector in vectors]
@@ -45,15 +45,16 @@ class Sharpened:
 
 
 class Foresight:
-    """`Sharpened` errors of the hand: now, at the look-ahead target, and if hand and target went on as they do.
+    """`Sharpened` errors of the hand: now, against the look-ahead target, and at the times `AHEAD`.
 
-    What an action is worth shows in the errors to come, and the tip of the value lies where those vanish, at a hand's
-    velocity that a network would have to work out from ten joint rates.
+    The errors ahead are those of a hand and a target that keep their velocities. The value of an action depends on
+    them, and has its tip where they vanish: at a velocity of the hand that a network would have to work out from ten
+    joint rates.
 
     Args:
-        layout: of the observation.
-        arm: whose hand it is.
-        pose: what the observation's joint angles are counted from [rad], (n,).
+        layout: layout of the observation.
+        arm: arm of n joints that the hand belongs to.
+        pose: joint angles at which the observation's are zero [rad], shape (n,).
     """
 
     def __init__(self, layout: ObservationLayout, arm: ArmParameters, pose: ArrayLike) -> None:
@@ -65,16 +66,20 @@ class Foresight:
         errors += [slice(layout.size + 3 * k, layout.size + 3 * (k + 1)) for k in range(len(AHEAD))]
         self.sharpened = Sharpened(layout.size + 3 * (len(AHEAD) + 1), errors)
         self.size = self.sharpened.size
-        """Of what it gives."""
+        """Length of the output vector [-]."""
 
     def __call__(self, observation: Tensor) -> Tensor:
-        """From the observations of B arms to (B, size)."""
+        """Inputs of the networks [-], shape (B, size), from observations [-], shape (B, layout.size)."""
         error, velocity = self._read(observation, "hand_error"), self.velocity(observation)
         ahead = [(error + time * velocity) / self._scale["hand_error"] for time in AHEAD]
         return self.sharpened(torch.cat((observation, *ahead, velocity / VELOCITY_SCALE), dim=1))
 
     def velocity(self, observation: Tensor) -> Tensor:
-        """Of the hand less the target's mean one over the look-ahead time [m/s], (B, 3)."""
+        """Velocity of the hand less the target's mean velocity over the look-ahead time [m/s], shape (B, 3).
+
+        Args:
+            observation: observations of B arms [-], shape (B, layout.size).
+        """
         q, q_dot = self._read(observation, "joint_angle") + self.pose, self._read(observation, "joint_velocity")
         # Joint 1 is the yaw; link 1 stands upright.
         pitch, pitch_rate = (functional.pad(joints[:, 1:].cumsum(1), (1, 0)) for joints in (q, q_dot))
@@ -90,4 +95,5 @@ class Foresight:
         return torch.stack(hand, dim=1) - way / LOOKAHEAD
 
     def _read(self, observation: Tensor, name: str) -> Tensor:
+        """A feature in SI units, shape (B, entries)."""
         return observation[:, self._slices[name]] * self._scale[name]

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from agents.learning.settings import Activation, AlgorithmSettings
+from agents.learning.settings import Activation, AlgorithmSettings, check_counts, check_shares
 
 
 @dataclass(frozen=True, kw_only=True)
 class SACSettings(AlgorithmSettings):
-    """Soft actor-critic, chosen for this arm.
+    """Settings of soft actor-critic (SAC) with quadratic critics, found for this arm.
 
-    Stock settings start with uniform voltages up to 24 V, which fling the arm about: here the first data come from a
-    controller that works, and the first actor imitates it, or both from a narrow actor.
+    Stock settings start with uniform voltages up to 24 V, which fling the arm about. Here the first data come from a
+    controller that works, and the actor imitates it first; or both come from an actor with narrow noise.
     """
 
     total_timesteps: int = 5_600_000
@@ -26,66 +26,69 @@ class SACSettings(AlgorithmSettings):
     hidden: tuple[int, ...] = (64, 64)
     critic_hidden: tuple[int, ...] | None = (128, 128)
     buffer_size: int = 1_000_000
-    """Control periods remembered, of all arms together."""
+    """Size of the replay buffer [control periods], summed over all arms."""
     batch_size: int = 1024
-    """Samples per gradient step. With a quarter of them the critics know too little of the actor's first steps: with
-    one elbow they ended in a fall (a return of -742 instead of -113)."""
+    """Number of samples in each gradient step.
+    A quarter of them left the critics too ignorant for the actor's first steps: one elbow ended in a fall."""
     train_freq: int = 1
-    """Control periods of every arm between two rounds of gradient steps."""
+    """Time between two rounds of gradient steps [control periods], counted on each arm."""
     gradient_steps: int = 4
-    """Per round; -1 for as many as control periods were collected."""
+    """Number of gradient steps in each round; as many as control periods were collected when -1."""
     huber_delta: float | None = 0.1
-    """Temporal-difference error [return] past which the critics' loss is linear; squared throughout when None."""
+    """Temporal-difference error past which the critics' loss is linear [return]; squared throughout when None."""
     tau: float = 0.005
-    """Share by which the target critic follows."""
+    """Share of the way to the critics that the target critics go in each gradient step [-]."""
     actor_rate: float = 0.2
-    """The actor's learning rate over the critics'."""
+    """Learning rate of the actor as a multiple of learning_rate, which is the critics' [-]."""
     center_tau: float = 0.002
-    """Share by which the centre of the critics' quadratic form follows the actor."""
+    """Share of the way to the actor that the centre of the critics' quadratic form goes in each gradient step [-]."""
     average_tau: float = 0.0005
-    """Share by which the average of the actors, which is the policy, follows the actor; 1 for the last actor itself."""
+    """Share of the way to the actor that the average of the actors goes in each gradient step [-].
+    The average is the policy; with 1 it is the last actor."""
     critic_head_start: int = 1500
-    """Gradient steps of the critics before the actor's first."""
+    """Number of gradient steps of the critics before the actor's first."""
     proximity: float = 0.0
-    """Weight of half the squared departure of the actor's mean from the centre, in the actor's loss."""
+    """Weight of half the squared distance between the actor's mean and the centre, in the actor's loss [return]."""
     first_proximity: float | None = None
-    """What `proximity` starts at, if it falls: critics that know little yet must not move the actor far."""
+    """Value of proximity at the start of the training [return]; constant when None.
+    A high one keeps critics that know little yet from moving the actor far."""
     proximity_until: float = 0.5
-    """Share of the training after which `proximity`, falling geometrically, is its own."""
+    """Share of the training during which proximity falls from first_proximity, geometrically [-], in (0, 1]."""
     ent_coef: str = "auto_0.02"
-    """Weight of the entropy: a number, or "auto" or "auto_START" to have it learned."""
+    """Weight of the entropy [return/nat]: a number, or "auto" or "auto_START" for one that is learned."""
     target_entropy: float | None = -12.0
-    """What a learned weight aims at [nat]; minus the number of joints when None."""
+    """Entropy at which a learned weight aims [nat]; minus the number of joints when None."""
     target_entropy_final: float | None = -30.0
-    """What it falls to, linearly over the training; it stays when None. Under wide noise a miss of millimetres costs
-    next to nothing; under narrow noise critics do not learn what an action is worth."""
+    """Entropy aimed at when the training ends, approached linearly [nat]; target_entropy throughout when None.
+    Under wide noise, missing by millimetres costs next to nothing.
+    Under narrow noise, critics do not learn what an action is worth."""
     log_std_init: float = -2.0
-    """Natural logarithm of the actor's first spread, before the squashing."""
+    """Natural logarithm of the actions' standard deviation at the start, before the squashing [-]."""
     learning_starts: int = 256_000
-    """Control periods of `warm_start` data, of all arms together, before the first gradient step: two episodes."""
+    """Length of the data from warm_start before the first gradient step [control periods], summed over all arms."""
     warm_start: Literal["uniform", "actor", "pd"] = "pd"
-    """Where they come from: uniform voltages, the untrained narrow actor, or computed torque with noise, which is the
-    PD with the model's feed-forward and, unlike the paper's, bears being read at 50 Hz."""
+    """Source of the first data: uniform voltages, the untrained actor with its narrow noise, or computed torque.
+    Computed torque is the PD with the model's feed-forward, with noise; it tolerates a rate of 50 Hz."""
     warm_start_noise: float = 0.1
-    """Standard deviation of that noise, in units of the supply voltage."""
+    """Standard deviation of the noise on computed torque's actions, in units of the supply voltage."""
     imitation_steps: int = 6000
-    """Gradient steps in which the first actor learns what computed torque did, before any of the critics'; none where
-    the data come from elsewhere."""
+    """Number of gradient steps in which the actor first imitates computed torque; none with another warm_start."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        check_counts(self, "buffer_size", "batch_size", "train_freq")
+        check_shares(self, "tau", "center_tau", "average_tau", "proximity_until")
         if self.target_entropy_final is not None and self.target_entropy is None:
             raise ValueError("target_entropy must be a number where there is a target_entropy_final, got None")
         if self.first_proximity is not None and not min(self.first_proximity, self.proximity) > 0.0:
             both = (self.first_proximity, self.proximity)
             raise ValueError(f"first_proximity and proximity must be positive for one to fall to the other, got {both}")
-        if not 0.0 < self.proximity_until <= 1.0:
-            raise ValueError(f"proximity_until must lie in (0, 1], got {self.proximity_until}")
 
     def follow_plan(self, model: Any, done: float) -> None:
-        """The entropy aimed at is linear from `target_entropy` to `target_entropy_final`, if there is one.
+        """Sets the entropy aimed at and the proximity, where they change over the training.
 
-        The proximity falls geometrically from `first_proximity`, if there is one.
+        The entropy is linear from `target_entropy` to `target_entropy_final`. The proximity is geometric from
+        `first_proximity` to `proximity`.
         """
         if self.first_proximity is not None:
             left = max(0.0, 1.0 - done / self.proximity_until)
@@ -96,18 +99,18 @@ class SACSettings(AlgorithmSettings):
 
     @property
     def log_interval(self) -> int:
-        """Episodes between two entries in TensorBoard: one entry whenever all arms have ended theirs."""
+        """Number of episodes between two entries in TensorBoard: one entry whenever all arms have ended theirs."""
         return self.num_envs
 
     @property
     def model_class(self) -> Any:
-        """Stable-Baselines3's SAC with quadratic critics."""
+        """Class of Stable-Baselines3's SAC with quadratic critics."""
         from agents.learning.sac.agent import SAC
 
         return SAC
 
     def model(self, env: Any, seed: int, log: Path) -> Any:
-        """The SAC; `agents.learning.warm_start` fills its replay buffer."""
+        """SAC with quadratic critics on the CPU, its replay buffer empty. Arguments of `AlgorithmSettings.model`."""
         import torch
 
         from agents.learning.sac.inputs import Foresight
