@@ -1,11 +1,12 @@
-"""Files appear whole or not at all: written under a temporary name, then renamed."""
+"""Files and folders that appear whole or not at all: written under a temporary name, then renamed."""
 
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from tempfile import NamedTemporaryFile, mkdtemp
 from typing import Any
 
 
@@ -20,6 +21,19 @@ def write_whole(path: Path, write: Callable[[Path], Any]) -> Path:
         os.replace(temporary, path)
     except BaseException:
         temporary.unlink(missing_ok=True)
+        raise
+    return path
+
+
+def write_folder(path: Path, write: Callable[[Path], Any]) -> Path:
+    """Has `write` fill a temporary folder beside `path`, named ".NAME-...", and renames it to `path`."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = Path(mkdtemp(dir=path.parent, prefix=f".{path.name}-"))
+    try:
+        write(temporary)
+        os.replace(temporary, path)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
         raise
     return path
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from agents.learning.evaluation import COLUMNS, write_evaluations
+from agents.learning.evaluation import COLUMNS
+from agents.learning.run_folder import RunFolder
 from benchmarks import learning
 from benchmarks.learning import Curve, Goal
 
@@ -46,7 +47,7 @@ def test_figure_and_table_come_from_the_files(tmp_path):
     for seed, energy in ((0, 600.0), (1, 900.0)):
         row = dict.fromkeys(COLUMNS, 1.0) | {"electrical_energy": energy, "return": -30.0 - seed}
         rows = [[row[name] if name != "steps" else steps for name in COLUMNS] for steps in (0.0, 100.0)]
-        write_evaluations(results / "run", rows)
+        RunFolder(results / "run").write_evaluations(rows)
         (results / "learning").mkdir(exist_ok=True)
         (results / "run/evaluations.csv").rename(results / f"learning/ppo_elbows2_seed{seed}.csv")
     assert learning.save(results) == [("ppo", "elbows2", "2", "1", "0", "1", "1", "-30.5")]

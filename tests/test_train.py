@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,10 +15,9 @@ import pytest
 from stable_baselines3 import PPO
 
 from agents.learning.callback import Keeper
-from agents.learning.checkpoint import checkpoints
 from agents.learning.evaluation import COLUMNS
 from agents.learning.ppo import PPOSettings
-from agents.learning.run_folder import Run
+from agents.learning.run import Run
 from agents.learning.sac.settings import SACSettings
 from agents.learning.train import train, train_all
 from agents.learning.training_env import MeteredVectorEnv
@@ -58,8 +58,8 @@ def test_run_leaves_policy_checkpoint_curve_and_tensorboard(done):
     run, result = done
     assert result["finished"]
     assert result["best"]["return"] == pytest.approx(max(row[3] for row in evaluations(run.folder)), rel=1e-9)
-    [checkpoint] = checkpoints(run.folder)
-    assert PPO.load(checkpoint / "model.zip", device="cpu").num_timesteps == 1024
+    assert len(list(run.folder.glob("checkpoint_*"))) == 1
+    assert PPO.load(run.files.checkpoint().model, device="cpu").num_timesteps == 1024
     events = EventAccumulator(str(next((run.folder / "tensorboard").rglob("events*")).parent)).Reload()
     wanted = {"evaluation/return", *(f"rollout/{name}" for name in ("reward_tracking", "reward_energy"))}
     assert wanted <= set(events.Tags()["scalars"])
@@ -113,7 +113,7 @@ def kill(folder, algorithm):
 def test_killed_run_goes_on_to_the_same_policy(done, tmp_path):
     folder = tmp_path / "run"
     kill(folder, "ppo")
-    assert [path.name for path in checkpoints(folder)] == ["checkpoint_000000000512"]
+    assert [path.name for path in folder.glob("checkpoint_*")] == ["checkpoint_000000000512"]
     result = train(small_run(folder), resume=True)
     assert result["finished"]
     assert [row[0] for row in evaluations(folder)] == [0, 256, 512, 768, 1024]
@@ -144,6 +144,20 @@ def test_finished_run_is_left_alone(done, monkeypatch):
     assert train(done[0], resume=True) == done[1]
 
 
+def test_result_that_a_kill_prevented_is_made_on_resuming(done, tmp_path):
+    shutil.copytree(done[0].folder, tmp_path / "run")
+    run = replace(done[0], folder=tmp_path / "run")
+    for left in (None, {"finished": False}):
+        (run.folder / "result.json").unlink()
+        if left is not None:
+            run.files.write_result(left)
+        result = train(run, resume=True)
+        assert (result["finished"], result["steps"]) == (True, 1024)
+        assert result["best"] == done[1]["best"]
+        assert run.files.result() == result
+        assert [row[0] for row in evaluations(run.folder)] == [0, 256, 512, 768, 1024]
+
+
 def test_run_is_neither_overwritten_nor_resumed_with_other_settings(done):
     run = done[0]
     with pytest.raises(ValueError, match="output must be free of earlier runs, or --resume be given, got"):
@@ -168,6 +182,15 @@ def test_seeds_in_processes_train_what_they_train_alone(done, tmp_path):
     assert any((weights(tmp_path / "seed1")[name] != alone).any() for name, alone in weights(done[0].folder).items())
     with pytest.raises(ValueError, match="workers must be positive, got 0"):
         train_all(runs, workers=0)
+    with pytest.raises(ValueError, match="runs must be at least one, got none"):
+        train_all([])
+
+
+def test_no_seed_starts_where_a_folder_holds_another_run(done, tmp_path):
+    new = small_run(tmp_path / "new", seed=1)
+    with pytest.raises(ValueError, match="output must be free of earlier runs"):
+        train_all([new, done[0]], workers=1)
+    assert not new.folder.exists()
 
 
 def test_orphan_stops(monkeypatch, tmp_path):
@@ -209,7 +232,7 @@ def test_killed_sac_goes_on_to_the_same_policy(tmp_path):
     whole, cut = small_run(tmp_path / "whole", **SAC_KILLED), small_run(tmp_path / "cut", **SAC_KILLED)
     train(whole)
     kill(cut.folder, "sac")
-    assert [path.name for path in checkpoints(cut.folder)] == ["checkpoint_000000000600"]
+    assert [path.name for path in cut.folder.glob("checkpoint_*")] == ["checkpoint_000000000600"]
     assert train(cut, resume=True)["finished"]
     columns = [[row[:1] + row[3:] for row in evaluations(run.folder)] for run in (whole, cut)]
     np.testing.assert_allclose(*columns, rtol=1e-12)
@@ -229,7 +252,7 @@ def test_sac_checkpoint_holds_the_replay_buffer(tmp_path):
     card = load_policy(run.folder / "best").card
     assert (card.algorithm, card.output, card.activation) == ("sac", "tanh", "relu")
     monitored = VecMonitor(SB3VecEnv(MeteredVectorEnv(4, **run.environment)))
-    model = load_checkpoint(checkpoints(run.folder)[-1], SAC_SMALL.model_class, monitored)
+    model = load_checkpoint(run.files.checkpoint(), SAC_SMALL.model_class, monitored)
     buffer = model.replay_buffer
     assert (model.num_timesteps, buffer.pos, buffer.full) == (1240, 310, False)
     # What follows an observation is the next one, but where an episode of 50 periods ends.

@@ -1,4 +1,4 @@
-"""The callback of a training run: evaluates, checkpoints, and keeps the best policy."""
+"""Callback of a training run, which evaluates, saves checkpoints and keeps the best policy."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import multiprocessing
 import sys
 import time
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -15,28 +14,21 @@ from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
 from agents.learning.checkpoint import save_checkpoint
-from agents.learning.evaluation import (
-    evaluation,
-    evaluation_row,
-    evaluation_seeds,
-    read_evaluations,
-    sentence,
-    write_evaluations,
-)
-from agents.learning.run_folder import Run
+from agents.learning.evaluation import evaluation, evaluation_row, evaluation_seeds, sentence
+from agents.learning.run import Run
 from agents.learning.training_env import MeteredVectorEnv
-from agents.policy import Policy, load_policy, pair, policy_of
+from agents.policy import Policy, policy_of
 from elbow_gym.task.settings import Settings
 
 
 class Keeper(BaseCallback):
-    """Evaluates every so many control periods, keeps what was best by return, and saves checkpoints by the clock.
+    """Evaluates by control periods, keeps the policy with the best return, and saves checkpoints by the clock.
 
     Args:
         run: the run.
         env: the batched environment under the model's.
-        progress: what the checkpoint that goes on holds; None for a new run.
-        position: of the progress bar on the terminal.
+        progress: progress of the checkpoint that the run goes on from; None for a new run.
+        position: line of the progress bar on the terminal, from 0.
     """
 
     def __init__(
@@ -49,8 +41,9 @@ class Keeper(BaseCallback):
         self._wall = 0.0 if progress is None else float(progress["wall_seconds"])
         self._first = 0 if progress is None else int(progress["steps"])
         self._now = self._saved = time.monotonic()
-        self._rows = [] if progress is None else read_evaluations(run.folder, self._first)
-        self._best = _best_so_far(run.folder) if progress is not None else None
+        self._rows = [] if progress is None else run.files.evaluations(self._first)
+        # Without its second file, which a kill may prevent, what the checkpoint repeats writes both anew.
+        self._best = None if progress is None else run.files.best()
         self._bar = tqdm(
             total=run.settings.total_timesteps,
             initial=self._first,
@@ -63,25 +56,25 @@ class Keeper(BaseCallback):
 
     @property
     def best(self) -> Policy:
-        """The policy with the best return so far."""
+        """Policy with the best return so far. Raises RuntimeError before the first evaluation."""
         if self._best is None:
             raise RuntimeError("no policy was evaluated yet")
         return self._best
 
     @property
     def seconds(self) -> tuple[float, float]:
-        """Time that the training took without evaluations and checkpoints, and in all [s]."""
+        """Time of the training without evaluations and checkpoints, and in all [s]."""
         return self._training, self._wall
 
     def tick(self, training: bool) -> None:
-        """Counts the time since the last call as training or not."""
+        """Counts the time since the last call to the training, or only to all."""
         now = time.monotonic()
         self._wall += now - self._now
         self._training += now - self._now if training else 0.0
         self._now = now
 
     def show(self, steps: int) -> None:
-        """Moves the progress bar."""
+        """Moves the progress bar to a number of control periods."""
         self._bar.update(steps - self._bar.n)
 
     def _on_step(self) -> bool:
@@ -112,7 +105,7 @@ class Keeper(BaseCallback):
                 self.logger.record(f"rollout/{name}", scale * mean)
 
     def finish(self, model: BaseAlgorithm) -> None:
-        """The last evaluation and checkpoint, after the training or its interruption."""
+        """Makes the last evaluation and checkpoint, after the training or its interruption."""
         self._bar.close()
         self.evaluate(model)
         if model.num_timesteps < self._run.settings.total_timesteps:
@@ -129,12 +122,12 @@ class Keeper(BaseCallback):
             "training_seconds": self._training,
             "wall_seconds": self._wall,
         }
-        save_checkpoint(self._run.folder, model, model.get_env(), progress)
+        save_checkpoint(self._run.files, model, model.get_env(), progress)
         self.tick(training=False)
         self._saved = self._now
 
     def evaluate(self, model: BaseAlgorithm) -> None:
-        """Plays the deterministic policy on the evaluation seeds; says what came out and keeps the best."""
+        """Plays the deterministic policy on the evaluation seeds, prints the metrics and keeps the best policy."""
         if model.num_timesteps == self._evaluated:
             return
         self.tick(training=True)
@@ -145,10 +138,10 @@ class Keeper(BaseCallback):
         for name, value in figures.items():
             model.logger.record(f"evaluation/{name}", value)
         self._rows.append(evaluation_row(model.num_timesteps, self._training, self._wall, figures))
-        write_evaluations(self._run.folder, self._rows)
+        self._run.files.write_evaluations(self._rows)
         if self._best is None or figures["return"] > self._best.card.evaluation["return"]:
             policy.card.evaluation.update(figures, seeds=list(evaluation_seeds(self._settings)))
-            policy.save(self._run.folder / "best")
+            self._run.files.write_best(policy)
             self._best = policy
         self._say(model.num_timesteps, figures)
         self.tick(training=False)
@@ -163,11 +156,3 @@ class Keeper(BaseCallback):
         eta = f", {left / 60:.0f} min left" if left > 0.0 else ""
         line = f"{self._run.name}: {steps:>9,d} steps, {self._training:4.0f} s{eta}: {sentence(figures)}"
         print(line, file=sys.stdout, flush=True)
-
-
-def _best_so_far(folder: Path) -> Policy | None:
-    try:
-        return load_policy(folder / "best") if pair(folder / "best")[0].is_file() else None
-    except ValueError:
-        # Killed between the two files of a save: what the checkpoint repeats writes them anew.
-        return None

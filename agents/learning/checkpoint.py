@@ -1,94 +1,58 @@
-"""Checkpoints of a training: all that it needs to go on, in one folder that appears whole or not at all.
-
-They hold pickles (Stable-Baselines3's zip and the random generators' states): load only checkpoints of your own runs.
-Policies that are shipped hold none; see `agents.policy`.
-"""
+"""State of a training between two steps: what a checkpoint takes from a model and gives back to it."""
 
 from __future__ import annotations
 
-import json
-import os
-import pickle
 import random
-import shutil
 from collections.abc import Mapping
-from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-PREFIX = "checkpoint_"
+from agents.learning.run_folder import Checkpoint, RunFolder
+
 BUFFER_ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+"""Arrays of Stable-Baselines3's replay buffer."""
 
 
-def save_checkpoint(folder: Path, model: Any, monitored: Any, progress: Mapping[str, Any]) -> Path:
-    """Writes `folder`/checkpoint_STEPS and removes the older ones.
+def save_checkpoint(folder: RunFolder, model: Any, monitored: Any, progress: Mapping[str, Any]) -> None:
+    """Writes a checkpoint of the training as it is now.
 
     Args:
         folder: the run's.
-        model: Stable-Baselines3's.
+        model: model of Stable-Baselines3.
         monitored: the `VecMonitor` over the `SB3VecEnv` that it trains in.
-        progress: what else goes on, JSON types only.
+        progress: control periods and seconds so far, JSON types only.
     """
     import torch
 
-    target = folder / f"{PREFIX}{model.num_timesteps:012d}"
-    if target.exists():
-        return target
-    folder.mkdir(parents=True, exist_ok=True)
-    temporary = Path(mkdtemp(dir=folder, prefix=f".{PREFIX}"))
-    try:
-        model.save(temporary / "model.zip")
-        if getattr(model, "replay_buffer", None) is not None:
-            _save_buffer(model.replay_buffer, temporary / "replay_buffer.npz")
-        state = {
-            "env": monitored.venv.env.get_state(),
-            "returns": monitored.episode_returns.copy(),
-            "lengths": monitored.episode_lengths.copy(),
-            "torch": torch.get_rng_state(),
-            "numpy": np.random.get_state(),  # noqa: NPY002  the global one is what SB3 draws from
-            "python": random.getstate(),
-        }
-        with (temporary / "state.pkl").open("wb") as handle:
-            pickle.dump(state, handle)
-        (temporary / "progress.json").write_text(json.dumps(dict(progress), indent=2) + "\n", encoding="utf-8")
-        os.replace(temporary, target)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
-    for other in folder.glob(f".{PREFIX}*"):
-        shutil.rmtree(other, ignore_errors=True)
-    for other in checkpoints(folder)[:-1]:
-        shutil.rmtree(other, ignore_errors=True)
-    return target
+    state = {
+        "env": monitored.venv.env.get_state(),
+        "returns": monitored.episode_returns.copy(),
+        "lengths": monitored.episode_lengths.copy(),
+        "torch": torch.get_rng_state(),
+        "numpy": np.random.get_state(),  # noqa: NPY002  the global one is what SB3 draws from
+        "python": random.getstate(),
+    }
+    buffer = getattr(model, "replay_buffer", None)
+    arrays = None if buffer is None else _filled(buffer)
+    folder.write_checkpoint(model.num_timesteps, model.save, arrays, state, progress)
 
 
-def checkpoints(folder: Path) -> list[Path]:
-    """The checkpoints in a run's folder, the latest last."""
-    return sorted(folder.glob(f"{PREFIX}*"))
-
-
-def load_progress(checkpoint: Path) -> dict[str, Any]:
-    """What was saved as `progress`."""
-    return json.loads((checkpoint / "progress.json").read_text(encoding="utf-8"))
-
-
-def load_checkpoint(checkpoint: Path, model_class: Any, monitored: Any) -> Any:
+def load_checkpoint(checkpoint: Checkpoint, model_class: Any, monitored: Any) -> Any:
     """The model as it was, with the environment and all random generators set back to that moment.
 
     Args:
-        checkpoint: of one's own run; it is unpickled.
-        model_class: Stable-Baselines3's class.
+        checkpoint: of a run of your own, because it is unpickled.
+        model_class: class of Stable-Baselines3's model.
         monitored: a `VecMonitor` over an `SB3VecEnv` like the one that was saved.
     """
     import torch
 
-    model = model_class.load(checkpoint / "model.zip", env=monitored, device="cpu", force_reset=False)
-    if (checkpoint / "replay_buffer.npz").is_file():
-        _load_buffer(model.replay_buffer, checkpoint / "replay_buffer.npz")
-    with (checkpoint / "state.pkl").open("rb") as handle:
-        state = pickle.load(handle)
+    model = model_class.load(checkpoint.model, env=monitored, device="cpu", force_reset=False)
+    for name, array in checkpoint.buffer():
+        _refill(model.replay_buffer, name, array)
+    state = checkpoint.state()
     monitored.venv.env.set_state(state["env"])
     monitored.episode_returns, monitored.episode_lengths = state["returns"], state["lengths"]
     torch.set_rng_state(state["torch"])
@@ -97,15 +61,15 @@ def load_checkpoint(checkpoint: Path, model_class: Any, monitored: Any) -> Any:
     return model
 
 
-def _save_buffer(buffer: Any, path: Path) -> None:
-    # The filled part alone: a large buffer is mostly empty for long.
+def _filled(buffer: Any) -> dict[str, NDArray[Any]]:
+    """The filled part of a replay buffer, since a large one is mostly empty for long, and where it goes on."""
     size = buffer.buffer_size if buffer.full else buffer.pos
     arrays = {name: getattr(buffer, name)[:size] for name in BUFFER_ARRAYS}
-    np.savez(path, pos=buffer.pos, full=buffer.full, **arrays)
+    return {"pos": np.array(buffer.pos), "full": np.array(buffer.full), **arrays}
 
 
-def _load_buffer(buffer: Any, path: Path) -> None:
-    with np.load(path, allow_pickle=False) as arrays:
-        for name in BUFFER_ARRAYS:
-            getattr(buffer, name)[: len(arrays[name])] = arrays[name]
-        buffer.pos, buffer.full = int(arrays["pos"]), bool(arrays["full"])
+def _refill(buffer: Any, name: str, array: NDArray[Any]) -> None:
+    if name in BUFFER_ARRAYS:
+        getattr(buffer, name)[: len(array)] = array
+    else:
+        setattr(buffer, name, array.item())

@@ -1,4 +1,4 @@
-"""Clones the LQR on the optimum into a network: imitation with the network's own visits labelled (DAgger)."""
+"""Imitation of the LQR on the optimum by a network, on the states that the network itself visits (DAgger)."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import Trajectory
-from agents.files import write_text
 from agents.learning.clone_settings import CloneSettings
-from agents.learning.run_folder import check_run, machine, open_run, versions
+from agents.learning.run import machine, versions
+from agents.learning.run_folder import RunFolder
 from agents.policy import Policy, PolicyCard
 from agents.workers import Job, Tell, in_processes
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 LOWEST_RATE = 0.01
-"""The learning rate ends at this share of its start."""
+"""Share of its start that the learning rate ends at [-]."""
 
 
 def clone(
@@ -40,12 +40,12 @@ def clone(
     """Fits a network to the actions of the LQR around a trajectory, on the states that the network itself runs into.
 
     Args:
-        settings: the environment's, JSON types only.
-        trajectory: the optimum that the teacher follows.
-        how: the settings of the imitation.
-        seed: of the network, the start poses, the noise and the batches.
+        settings: settings of the environment, JSON types only.
+        trajectory: optimum that the teacher follows.
+        how: settings of the imitation.
+        seed: seed of the network, the start poses, the noise and the batches.
         card: further fields of the policy's card.
-        after_round: called with the control periods played so far and the policy as it is then.
+        after_round: called with the number of control periods so far, summed over all arms, and the policy.
 
     Returns:
         The policy after the last round.
@@ -130,8 +130,8 @@ def clone_all(
 ) -> dict[int, dict[str, Any]]:
     """Clones with several seeds side by side in processes, with a progress bar; the results by seed.
 
-    Each folder gets what a training's has: `run.json`, `best.json` and `best.safetensors`, `evaluations.csv` and
-    `result.json`. With `resume` the seeds that are finished are left alone; the others, a minute each, start anew.
+    Each folder gets the files of a `RunFolder` but checkpoints and logs. With `resume` the seeds that are finished are
+    left alone; the others, a minute each, start anew.
 
     Raises:
         ValueError: there is no such trajectory, or a folder holds a run already and `resume` is not set or it had
@@ -144,10 +144,11 @@ def clone_all(
     results: dict[int, dict[str, Any]] = {}
     jobs: dict[int, Job[dict[str, Any]]] = {}
     for seed, folder in zip(seeds, folders, strict=True):
-        check_run(folder, _record(settings, trajectory, how, seed), resume)
-        finished = folder / "result.json"
-        if finished.is_file():
-            results[seed] = json.loads(finished.read_text(encoding="utf-8"))
+        files = RunFolder(folder)
+        files.check(_record(settings, trajectory, how, seed), resume)
+        finished = files.result()
+        if finished is not None:
+            results[seed] = finished
         else:
             jobs[seed] = Job(partial(_clone_one, settings, trajectory, how, seed, folder, command), how.rounds)
     if jobs:
@@ -157,7 +158,7 @@ def clone_all(
 
 
 def _record(settings: Settings, trajectory: Path, how: CloneSettings, seed: int) -> dict[str, Any]:
-    """What makes the run the run that it is, JSON types only."""
+    """Everything that tells the run from others, JSON types only."""
     plain = {
         "environment": settings.arguments,
         "trajectory": hashlib.sha256(trajectory.read_bytes()).hexdigest(),
@@ -170,13 +171,14 @@ def _record(settings: Settings, trajectory: Path, how: CloneSettings, seed: int)
 def _clone_one(
     settings: Settings, trajectory: Path, how: CloneSettings, seed: int, folder: Path, command: str, tell: Tell
 ) -> dict[str, Any]:
-    """One seed in a process of its own."""
+    """Clones with one seed, in a process of its own."""
     import torch
 
-    from agents.learning.evaluation import evaluation, evaluation_row, evaluation_seeds, write_evaluations
+    from agents.learning.evaluation import evaluation, evaluation_row, evaluation_seeds
 
     torch.set_num_threads(1)
-    open_run(folder, _record(settings, trajectory, how, seed), resume=True)
+    files = RunFolder(folder)
+    files.open(_record(settings, trajectory, how, seed), resume=True)
     rows: list[list[float]] = []
     best: list[Policy] = []
     spent, since = 0.0, time.monotonic()
@@ -189,11 +191,11 @@ def _clone_one(
         spent += time.monotonic() - since
         figures = evaluation(policy, settings)
         rows.append(evaluation_row(steps, spent, time.monotonic() - started, figures))
-        write_evaluations(folder, rows)
+        files.write_evaluations(rows)
         if not best or figures["return"] > best[0].card.evaluation["return"]:
             policy.card.training.update(timesteps=steps, seconds=round(spent, 1))
             policy.card.evaluation.update(figures, seeds=list(evaluation_seeds(settings)))
-            policy.save(folder / "best")
+            files.write_best(policy)
             best[:] = [policy]
         tell(1)
         since = time.monotonic()
@@ -208,5 +210,5 @@ def _clone_one(
         "wall_seconds": round(time.monotonic() - started, 1),
         "best": best[0].card.evaluation,
     }
-    write_text(folder / "result.json", json.dumps(result, indent=2) + "\n")
+    files.write_result(result)
     return result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -59,7 +60,7 @@ def train_command(line: Sequence[str]) -> Callable[..., None]:
             settings: the algorithm's settings; the defaults are those for the algorithm, env and elbows given.
         """
         from agents.learning.evaluation import sentence
-        from agents.learning.run_folder import Run
+        from agents.learning.run import Run
         from agents.learning.train import train_all
 
         chosen = task_settings(env, elbows, json.loads(environment))
@@ -75,6 +76,7 @@ def train_command(line: Sequence[str]) -> Callable[..., None]:
             minutes=minutes,
             checkpoint_seconds=checkpoint_seconds,
             initial_policy=initial_policy,
+            command=" ".join(["python -m agents", *sys.argv[1:]]),
         )
         runs = [
             replace(first, seed=seed, folder=output / f"{name}_seed{seed}")

@@ -1,19 +1,17 @@
-"""Takes finished training runs over into the project: their best policies and their learning curves."""
+"""Publication of finished training runs in the project: their best policies and their learning curves."""
 
 from __future__ import annotations
 
-import json
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from agents.files import write_whole
-from agents.policy import SHIPPED, load_policy, pair
+from agents.learning.run_folder import RunFolder
+from agents.policy import SHIPPED
 from agents.tasks import task_name
 
 CURVES = Path(__file__).parents[2] / "benchmarks" / "results" / "learning"
 LARGEST = 300_000
-"""Of a shipped policy's two files together [B]."""
+"""Largest size of a shipped policy's two files together [B]."""
 
 
 def publish(
@@ -23,24 +21,26 @@ def publish(
 
     Args:
         runs: folders of finished runs, named ALGORITHM[_LABEL]_TASK_seedK as the training names them.
-        policies: where the policies go.
-        curves: where the curves go.
+        policies: folder of the policies.
+        curves: folder of the curves.
         replace_seeds: remove the shipped seeds of the same algorithm and task that are not among `runs`.
 
     Returns:
-        The names of what was published.
+        The names of the policies that were published.
 
     Raises:
-        ValueError: a run is not finished, or has not the name of what it holds, or its policy is too large.
+        ValueError: there are no runs, or a run is not finished, has not the name of what it holds, or holds no policy
+            or too large a one.
     """
-    names = [_checked(run) for run in runs]
+    if not runs:
+        raise ValueError("runs must be at least one folder of a finished training, got none")
+    folders = [RunFolder(run) for run in runs]
+    names = [_checked(folder) for folder in folders]
     policies.mkdir(parents=True, exist_ok=True)
     curves.mkdir(parents=True, exist_ok=True)
-    for run, name in zip(runs, names, strict=True):
-        # The card last: it is what makes a policy be found.
-        for source, target in reversed(list(zip(pair(run / "best"), pair(policies / name), strict=True))):
-            _copy(source, target)
-        _copy(run / "evaluations.csv", curves / f"{name}.csv")
+    for folder, name in zip(folders, names, strict=True):
+        folder.copy_best(policies / name)
+        folder.copy_evaluations(curves / f"{name}.csv")
     if replace_seeds:
         groups = {name.rpartition("_seed")[0] for name in names}
         for path in [*policies.iterdir(), *curves.iterdir()]:
@@ -49,21 +49,18 @@ def publish(
     return names
 
 
-def _copy(source: Path, target: Path) -> None:
-    write_whole(target, lambda temporary: shutil.copyfile(source, temporary))
-
-
-def _checked(run: Path) -> str:
+def _checked(folder: RunFolder) -> str:
     """The run's name, if it may be published."""
-    result = run / "result.json"
-    if not result.is_file() or not json.loads(result.read_text(encoding="utf-8"))["finished"]:
-        raise ValueError(f"runs must be finished trainings, got {run}")
-    card, name = load_policy(run / "best").card, run.resolve().name
+    result, policy = folder.result(), folder.best()
+    if result is None or not result["finished"]:
+        raise ValueError(f"runs must be finished trainings, got {folder.path}")
+    if policy is None:
+        raise ValueError(f"runs must hold a best policy, got none in {folder.path}")
+    card, name = policy.card, folder.name
     task = task_name(card.env, card.environment["elbows"])
     ends = f"_{task}_seed{card.training['seed']}"
     if not (name.startswith(card.algorithm) and name.endswith(ends)):
         raise ValueError(f"runs must be named {card.algorithm}[_LABEL]{ends} as what they hold, got {name}")
-    size = sum(path.stat().st_size for path in pair(run / "best"))
-    if size > LARGEST:
-        raise ValueError(f"a policy must have at most {LARGEST} bytes, got {size} in {run}")
+    if folder.best_size() > LARGEST:
+        raise ValueError(f"a policy must have at most {LARGEST} bytes, got {folder.best_size()} in {folder.path}")
     return name

@@ -1,8 +1,7 @@
-"""Trains SB3 agents on the batched environment: one run here, several seeds side by side in processes."""
+"""Training of Stable-Baselines3 agents on the batched environment: one run here, several side by side in processes."""
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import os
 import sys
@@ -10,9 +9,8 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
-from agents.files import write_text
-from agents.learning.checkpoint import checkpoints, load_checkpoint, load_progress
-from agents.learning.run_folder import Run, open_run
+from agents.learning.checkpoint import load_checkpoint
+from agents.learning.run import Run
 from agents.learning.sac.settings import SACSettings
 from elbow_gym.task.settings import Settings
 
@@ -23,17 +21,17 @@ SEED_STRIDE = 1_000_000
 def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
     """Trains one seed; Ctrl-C ends it and keeps the best policy so far.
 
-    Writes into the run's folder: `run.json` (what it is), `best.json` and `best.safetensors` each time an evaluation
-    improves, `evaluations.csv`, a checkpoint, TensorBoard logs, and in the end `result.json`.
+    Writes what `RunFolder` lists: the best policy each time an evaluation improves, a row per evaluation, a checkpoint
+    by the clock, TensorBoard logs, and the result at the end.
 
     Args:
         run: what is trained.
         resume: go on from the folder's latest checkpoint; a run that has made all its steps is left alone. Without a
             checkpoint it starts anew.
-        position: of the progress bar on the terminal.
+        position: line of the progress bar on the terminal, from 0.
 
     Returns:
-        What stands in `result.json`: name, seed, steps, seconds, and the figures of the best evaluation.
+        Name, seed, control periods and seconds of the run, and the metrics of its best evaluation.
 
     Raises:
         ValueError: the folder holds a run and `resume` is not set, or a run with other settings.
@@ -45,25 +43,28 @@ def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
     from agents.learning.training_env import MeteredVectorEnv
     from elbow_gym.sb3 import SB3VecEnv
 
-    open_run(run.folder, run.record(), resume)
-    found = checkpoints(run.folder)[-1:]
-    progress = load_progress(found[0]) if found else None
-    total = run.settings.total_timesteps
-    if progress is not None and (progress["steps"] >= total or _out_of_time(run, progress)):
-        return json.loads((run.folder / "result.json").read_text(encoding="utf-8"))
+    files, total = run.files, run.settings.total_timesteps
+    files.open(run.record(), resume)
+    found = files.checkpoint()
+    progress = None if found is None else found.progress()
+    result = files.result()
+    over = progress is not None and (progress["steps"] >= total or _out_of_time(run, progress))
+    # A kill between the last checkpoint and the result leaves the result to be made.
+    if over and result is not None and result["finished"]:
+        return result
     # Small networks lose more by handing work between threads than they gain.
     torch.set_num_threads(1)
     settings = Settings(**run.environment)
     env = MeteredVectorEnv(run.settings.num_envs, **run.settings.training_arguments(settings.arguments))
     monitored = VecMonitor(SB3VecEnv(env))
-    if found:
-        model = load_checkpoint(found[0], run.settings.model_class, monitored)
+    if found is not None:
+        model = load_checkpoint(found, run.settings.model_class, monitored)
     else:
-        model = run.settings.model(monitored, run.seed, run.folder / "tensorboard")
+        model = run.settings.model(monitored, run.seed, files.tensorboard)
         monitored.seed(run.seed * SEED_STRIDE)
     keeper = Keeper(run, env, progress, position)
     try:
-        if not found:
+        if found is None:
             _prepare(run, model, env, keeper)
         env.staggered = True
         remaining = total - model.num_timesteps
@@ -81,7 +82,7 @@ def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
         "wall_seconds": round(wall, 1),
         "best": keeper.best.card.evaluation,
     }
-    write_text(run.folder / "result.json", json.dumps(result, indent=2) + "\n")
+    files.write_result(result)
     return result
 
 
@@ -90,7 +91,7 @@ def _out_of_time(run: Run, progress: dict[str, Any]) -> bool:
 
 
 def _prepare(run: Run, model: Any, env: Any, keeper: Any) -> None:
-    """What a training starts from, before its first step."""
+    """Gives the model what the training starts from: a policy's weights, or a demonstration and its imitation."""
     if run.initial_policy is not None:
         from agents.learning.warm_start import take_over
         from agents.policy import load_policy
@@ -105,13 +106,18 @@ def _prepare(run: Run, model: Any, env: Any, keeper: Any) -> None:
 
 
 def train_all(runs: Sequence[Run], workers: int = 2, resume: bool = False) -> list[dict[str, Any]]:
-    """Trains several runs, so many at a time in processes of their own, and returns the results in their order.
+    """Trains several runs, `workers` of them at a time in processes, and returns the results in their order.
 
     Raises:
-        ValueError: `workers` is not positive, or as `train` does, once the other runs have ended.
+        ValueError: there are no runs, `workers` is not positive, or a folder holds a run and `resume` is not set, or a
+            run with other settings; no run starts then.
     """
+    if not runs:
+        raise ValueError("runs must be at least one, got none")
     if workers < 1:
         raise ValueError(f"workers must be positive, got {workers}")
+    for run in runs:
+        run.files.check(run.record(), resume)
     _compile(runs[0])
     if workers == 1 or len(runs) == 1:
         return [train(run, resume, 0) for run in runs]
