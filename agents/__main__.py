@@ -1,20 +1,17 @@
-"""The command line: `python -m agents reproduce | train | clone | publish | evaluate | watch | report`."""
+"""Commands of the agents: `python -m agents reproduce | train | clone | publish | evaluate | watch | report`."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
+from tyro.conf import Positional, arg
 
-from agents.cli import run
-from agents.learning.clone_settings import CloneSettings
-from agents.learning.command import train_command
+from agents.cli import Commands, Count, Seed
 
-CLONE = CloneSettings()
-
-app = tyro.extras.SubcommandApp()
+app = Commands("python -m agents", "Controllers of the arm: training, evaluation, pictures, the paper's results.")
 
 
 @app.command
@@ -22,9 +19,9 @@ def reproduce(output: Path = Path("reproduction"), publish: bool = False, table:
     """The paper's three cases: Figs 1-25, the series, the numbers and a verdict on each of its claims.
 
     Args:
-        output: folder for figures, CSV files and the verdict.
-        publish: also refresh the README's picture and the committed numbers.
-        table: instead ask on a real table, which gives way and cannot pull, whether leaning on it saves energy: three
+        output: Folder for figures, CSV files and the verdict.
+        publish: Whether to refresh the README's picture and the committed numbers too.
+        table: Whether to ask instead if leaning on a real table, which gives way and cannot pull, saves energy: three
             start poses under three frictions.
     """
     if table:
@@ -37,50 +34,31 @@ def reproduce(output: Path = Path("reproduction"), publish: bool = False, table:
     reproduce_paper(output, publish=publish)
 
 
-app.command(train_command(sys.argv[1:]), name="train")
+@app.command_from
+def train(words: Sequence[str]) -> Callable[..., None]:
+    """Trains PPO or SAC agents, several seeds side by side."""
+    from agents.learning.command import train_command
+
+    return train_command(words)
+
+
+@app.command_from
+def clone(words: Sequence[str]) -> Callable[..., None]:
+    """Clones the optimal trajectory and the LQR around it into networks."""
+    from agents.learning.command import clone_command
+
+    return clone_command(words)
 
 
 @app.command
-def clone(
-    elbows: int = 2,
-    seeds: int = 1,
-    first_seed: int = 0,
-    resume: bool = False,
-    output: Path = Path("runs"),
-    trajectory: Path | None = None,
-    settings: Annotated[CloneSettings, tyro.conf.arg(name="")] = CLONE,
+def publish(
+    runs: Annotated[tuple[Path, ...], Positional, arg(metavar="FOLDER [FOLDER ...]")], /, replace_seeds: bool = False
 ) -> None:
-    """Clones the optimal trajectory and the LQR around it into networks, one folder OUTPUT/clone_elbowsN_seedK a seed.
-
-    Args:
-        elbows: elbows on the table.
-        seeds: how many networks.
-        first_seed: the first of the seeds.
-        resume: seeds that are finished are left alone, the others start anew.
-        output: folder of the runs.
-        trajectory: what is cloned; the benchmark's optimum for the elbow count when not given.
-        settings: of the imitation.
-    """
-    from agents.control.trajectory import OPTIMA
-    from agents.learning.clone import clone_all
-    from elbow_gym.task.settings import Settings
-
-    chosen = list(range(first_seed, first_seed + seeds))
-    folders = [output / f"clone_elbows{elbows}_seed{seed}" for seed in chosen]
-    source = OPTIMA / f"elbows{elbows}.npz" if trajectory is None else trajectory
-    command = " ".join(["python -m agents", *sys.argv[1:]])
-    results = clone_all(Settings(elbows=elbows), source, settings, chosen, folders, command, resume)
-    for result in results.values():
-        print(f"{result['name']}: {result['training_seconds']:.0f} s, return {result['best']['return']:.2f}")
-
-
-@app.command
-def publish(runs: tyro.conf.Positional[tuple[Path, ...]], /, replace_seeds: bool = False) -> None:
     """Takes finished runs over: best policies into agents/policies, curves into benchmarks/results/learning.
 
     Args:
-        runs: folders of the runs, as the training named them.
-        replace_seeds: also remove the shipped seeds of the same algorithm and task that are not among them.
+        runs: Folders of the runs, as the training named them.
+        replace_seeds: Whether to remove the shipped seeds of the same algorithm and task that are not among the runs.
     """
     from agents.learning.publish import publish as publish_runs
 
@@ -90,16 +68,20 @@ def publish(runs: tyro.conf.Positional[tuple[Path, ...]], /, replace_seeds: bool
 
 @app.command
 def evaluate(
-    policy: tyro.conf.Positional[str], /, elbows: int | None = None, env: str = "ElbowArm-v0", episodes: int = 20
+    policy: Annotated[str, Positional, arg(metavar="POLICY")],
+    /,
+    elbows: int | None = None,
+    env: str = "ElbowArm-v0",
+    episodes: Count = 20,
 ) -> None:
     """Plays a controller in the regimes A, B and C and prints what it cost.
 
     Args:
-        policy: "pd", "pd_paper", "pd_smooth", "pd_gravity", "computed_torque", "computed_torque_posture", the algorithm
-            of a shipped policy ("ppo"), or the path of a policy.
-        elbows: elbows on the table; the policy's own, or 2, when not given.
-        env: the environment's id, unless the policy is a path.
-        episodes: start poses, one fixed seed each.
+        policy: Controller: "pd", "pd_paper", "pd_smooth", "pd_gravity", "computed_torque", "computed_torque_posture",
+            the algorithm of a shipped policy ("ppo"), or the path of a policy.
+        elbows: Number of elbows on the table; that of the environment, or of the policy's file, when None.
+        env: Gymnasium id of the environment; a policy's file brings its own.
+        episodes: Number of episodes, each with a start pose of its own from a fixed seed.
     """
     from tqdm import tqdm
 
@@ -121,7 +103,7 @@ def report(output: Path = Path("report.html")) -> None:
     """One HTML file to look at: every controller's run to replay, the paper's Figs 1-25 and the benchmark.
 
     Args:
-        output: the file; it opens without a network.
+        output: File of the page, which opens without a network.
     """
     from agents.report.command import report as write_report
 
@@ -130,13 +112,13 @@ def report(output: Path = Path("report.html")) -> None:
 
 @app.command
 def watch(
-    controller: tyro.conf.Positional[str],
+    controller: Annotated[str, Positional, arg(metavar="CONTROLLER")],
     /,
     versus: str | None = None,
     elbows: int | None = None,
     env: str = "ElbowArm-v0",
     start: Literal["paper", "on_target"] = "paper",
-    seed: int = 0,
+    seed: Seed = 0,
     speed: float = 1.0,
     size: tuple[int, int] = (640, 480),
     output: Path | None = None,
@@ -144,15 +126,15 @@ def watch(
     """Shows a controller at work in a window, in real time; without a display it writes a video instead.
 
     Args:
-        controller: as for `evaluate`.
-        versus: another controller beside it, with the same start and in step.
-        elbows: elbows on the table; the environment's own number when not given.
-        env: id of the environment; a policy's file brings its own.
-        start: "paper": the paper's start pose; "on_target": the hand starts on the circle.
-        seed: of the start pose.
-        speed: seconds of the arm in one second.
-        size: width and height of each controller's picture in pixels.
-        output: a .gif or .mp4 to write instead of opening a window.
+        controller: Controller, by a name that `python -m agents evaluate --help` lists, or the path of a policy.
+        versus: Second controller, which is shown beside the first with the same start and in step.
+        elbows: Number of elbows on the table; that of the environment, or of the policy's file, when None.
+        env: Gymnasium id of the environment; a policy's file brings its own.
+        start: Start pose: "paper" for the paper's, "on_target" for one whose hand is on the circle.
+        seed: Seed of the start pose.
+        speed: Simulated time per second of real time [s/s].
+        size: Width and height of each controller's picture [pixels].
+        output: File to write instead of opening a window, .gif or .mp4.
     """
     from agents.watch.watch import watch as watch_controllers
 
@@ -165,4 +147,4 @@ def watch(
 
 
 if __name__ == "__main__":
-    run(app, "python -m agents", __doc__)
+    app.run()

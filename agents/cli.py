@@ -1,16 +1,201 @@
-"""How a command line of this project runs: errors of the user's making end with one line."""
+"""Command line of a program: its first word chooses a command, and tyro parses the others once."""
 
 from __future__ import annotations
 
+import inspect
+import io
+import json
+import re
 import sys
-from typing import Any
+import textwrap
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr
+from functools import partial
+from typing import Annotated, Any, NoReturn, get_type_hints
 
-from gymnasium.error import DependencyNotInstalled
+import tyro
+from tyro.conf import CascadeSubcommandArgs
+from tyro.constructors import PrimitiveConstructorSpec
+
+HELP = ("-h", "--help")
+WIDTH = 80
+"""Width of the list of commands [characters]."""
+
+Function = Callable[..., Any]
+"""Command: its arguments are the options, its docstring is the help."""
 
 
-def run(app: Any, prog: str, description: str | None) -> None:
-    """Runs a tyro app; a wrong argument or a missing extra ends with one line that says what is wrong."""
+class Commands:
+    """Commands of a program. Only the parser of the command that is asked for is built.
+
+    Args:
+        prog: words that start the program, such as "python -m agents".
+        summary: a sentence for the help.
+    """
+
+    def __init__(self, prog: str, summary: str) -> None:
+        self._prog, self._summary = prog, summary
+        self._functions: dict[str, Callable[[Sequence[str]], Function]] = {}
+        self._summaries: dict[str, str] = {}
+
+    def command(self, function: Function) -> Function:
+        """Adds a function as the command of its name."""
+        self._add(function, lambda _: function)
+        return function
+
+    def command_from(self, choose: Callable[[Sequence[str]], Function]) -> Callable[[Sequence[str]], Function]:
+        """Adds a command whose function, such as the defaults of its arguments, depends on the words after its name.
+
+        Args:
+            choose: returns the function for these words; has the name and the summary of the command.
+        """
+        self._add(choose, choose)
+        return choose
+
+    def _add(self, named: Function, choose: Callable[[Sequence[str]], Function]) -> None:
+        self._functions[named.__name__] = choose
+        self._summaries[named.__name__] = (named.__doc__ or "").strip().split("\n")[0]
+
+    def run(self, words: Sequence[str] | None = None) -> None:
+        """Runs a command; an error of the user's making, or a missing extra, ends with one line on stderr.
+
+        Args:
+            words: the command line after the program's name; that of this process when None.
+
+        Raises:
+            SystemExit: 0 after help, 2 if the words cannot be parsed, 1 if the command refused what they say.
+        """
+        try:
+            self.parse(sys.argv[1:] if words is None else words)()
+        except SystemExit:
+            raise
+        except _users_errors() as error:
+            sys.exit(f"error: {error}")
+
+    def parse(self, words: Sequence[str]) -> Callable[[], Any]:
+        """The call that a command line asks for, not made yet.
+
+        Raises:
+            SystemExit: 0 after help, 2 with one line on stderr if the words cannot be parsed.
+        """
+        if words and words[0] in HELP:
+            print(self.help())
+            sys.exit(0)
+        if not words or words[0] not in self._functions:
+            _refuse(f"command must be one of {', '.join(self._functions)}, got {words[0] if words else 'none'}")
+        name, *rest = words
+        return parse(self._functions[name](rest), f"{self._prog} {name}", rest)
+
+    def help(self) -> str:
+        """The program's usage, and its commands with a line each."""
+        left = 2 + max(map(len, self._summaries))
+        wrapper = textwrap.TextWrapper(WIDTH, subsequent_indent=" " * (left + 2))
+        commands = [wrapper.fill(f"  {name:{left}}{summary}") for name, summary in self._summaries.items()]
+        usage = f"usage: {self._prog} [-h] COMMAND ..."
+        more = f"`{self._prog} COMMAND --help` lists the options of a command."
+        return "\n".join((usage, "", textwrap.fill(self._summary, WIDTH), "", "commands:", *commands, "", more))
+
+
+def parse(function: Function, prog: str, words: Sequence[str]) -> Callable[[], Any]:
+    """The call of a function that a command line asks for, not made yet.
+
+    Args:
+        function: its arguments are the options, its docstring is the help.
+        prog: words that start the command, for the usage.
+        words: the command line after `prog`.
+
+    Raises:
+        SystemExit: 0 after help, 2 with one line on stderr if the words cannot be parsed.
+    """
+
+    def call(*positional: Any, **named: Any) -> Callable[[], Any]:
+        return partial(function, *positional, **named)
+
+    call.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]
+    call.__annotations__ = get_type_hints(function, include_extras=True)
+    # The lines of an argument's text are joined, which tyro would print as they are.
+    call.__doc__ = re.sub(r"\n {8}", " ", inspect.getdoc(function) or "")
+    said = io.StringIO()
     try:
-        app.cli(prog=prog, description=description)
-    except (ValueError, DependencyNotInstalled) as error:
-        sys.exit(f"error: {error}")
+        with redirect_stderr(said):
+            return tyro.cli(call, prog=prog, args=words, config=(CascadeSubcommandArgs,))
+    except SystemExit as end:
+        if not end.code:
+            raise
+    _refuse(f"{one_line(said.getvalue())}; see {prog} --help")
+
+
+def one_line(box: str) -> str:
+    """The reason in tyro's framed message, with the options or words that could be meant; the rest is left out."""
+    # Colours, and drawn or blank frames, follow the terminal.
+    plain = re.sub(r"\x1b\[[\d;]*m", "", box)
+    lines = re.findall(r"^(?:│ |  )(.*?)[ │]*$", plain, re.MULTILINE) or plain.splitlines()
+    end = next((k for k, line in enumerate(lines) if not line.strip("─-")), None)
+    # Help texts are indented by eight.
+    reason = " ".join(line.strip() for line in lines[:end] if not line.startswith(" " * 8))
+    reason = reason.removeprefix("Error parsing ").rstrip(".")
+    # An option's own rule follows its name; a group's name is left out, since its rule names the option.
+    reason = re.sub(r"^(--[\w-]+): (?=must)", r"\1 ", re.sub(r"^[a-z]\w*: ", "", reason))
+    if not reason.startswith("Unrecognized"):
+        return reason
+    meant = [line.split()[0].rstrip(",") for line in lines if re.match(" {4}--", line)]
+    if "misplaced" in reason:
+        places = dict.fromkeys(re.findall(r"^ {8}in .* (\w+) --help$", "\n".join(lines), re.MULTILINE))
+        return f"{', '.join(meant)} must come after {' or '.join(places)}"
+    known = [line.removeprefix("Available subcommands: ") for line in lines if line.startswith("Available subcommands")]
+    more = [f"perhaps {' or '.join(meant)} is meant"] if meant else []
+    return "; ".join([reason, *more, *(f"known: {names}" for names in known)])
+
+
+def _refuse(reason: str) -> NoReturn:
+    print(f"error: {reason}", file=sys.stderr)
+    sys.exit(2)
+
+
+def _users_errors() -> tuple[type[Exception], ...]:
+    # Evaluated once something was raised: help needs no Gymnasium.
+    from gymnasium.error import DependencyNotInstalled
+
+    return ValueError, DependencyNotInstalled
+
+
+def _integer(rule: str, least: int) -> PrimitiveConstructorSpec[int]:
+    def parsed(words: list[str]) -> int:
+        if not re.fullmatch(r"[+-]?\d+", words[0]) or int(words[0]) < least:
+            raise ValueError(f"must be {rule}, got {words[0]}")
+        return int(words[0])
+
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="INT",
+        instance_from_str=parsed,
+        is_instance=lambda value: isinstance(value, int),
+        str_from_instance=lambda value: [str(value)],
+    )
+
+
+def _json_object(words: list[str]) -> dict[str, Any]:
+    try:
+        plain = json.loads(words[0])
+    except json.JSONDecodeError as error:
+        raise ValueError(f"must be a JSON object, got {words[0]} ({error})") from error
+    if not isinstance(plain, dict):
+        raise ValueError(f"must be a JSON object, got {words[0]}")
+    return plain
+
+
+Count = Annotated[int, _integer("a positive integer", 1)]
+"""Option whose value is at least 1."""
+Seed = Annotated[int, _integer("an integer of at least 0", 0)]
+"""Option whose value is at least 0."""
+JsonObject = Annotated[
+    dict[str, Any],
+    PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="JSON",
+        instance_from_str=_json_object,
+        is_instance=lambda value: isinstance(value, dict),
+        str_from_instance=lambda value: [json.dumps(value)],
+    ),
+]
+"""Option whose value is a JSON object."""

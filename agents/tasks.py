@@ -1,22 +1,24 @@
-"""What is trained for: the registered environments and the elbow counts, by the short names that files carry."""
+"""Tasks of the agents: registered environments and elbow counts, by the short names that files carry."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import elbow_gym  # noqa: F401  registers the environments
-from elbow_gym.task.settings import Settings
+
+if TYPE_CHECKING:
+    from elbow_gym.task.settings import Settings
 
 ENVIRONMENTS = {"ElbowArm-v0": "elbows", "ElbowArmTable-v0": "table", "ElbowArmRandom-v0": "random"}
-"""Ids of the environments and what a task in them is called; the elbow count follows "elbows"."""
+"""Short names of the tasks by the environment's id; the elbow count follows "elbows"."""
 POLICY_NAME = re.compile(r"(?P<controller>[a-z]+(_[a-z]+)??)_(?P<task>elbows\d+|table|random)")
-"""What files of policies and curves are called before "_seedK": ALGORITHM[_LABEL]_TASK."""
+"""Names of the files of policies and curves before "_seedK": ALGORITHM[_LABEL]_TASK."""
 
 
 def registered_arguments(env: str) -> dict[str, Any]:
-    """The arguments that an id stands for. Raises ValueError for an id that is not in `ENVIRONMENTS`."""
+    """Arguments that an id stands for. Raises ValueError for an id that is not in `ENVIRONMENTS`."""
     from gymnasium import spec
 
     if env not in ENVIRONMENTS:
@@ -29,9 +31,11 @@ def task_settings(env: str, elbows: int | None = None, more: Mapping[str, Any] |
 
     Args:
         env: one of `ENVIRONMENTS`.
-        elbows: elbows on the table; the id's own, or 2, when None.
-        more: arguments that go before the id's.
+        elbows: number of elbows on the table; that of the id, or else 2, when None.
+        more: arguments that take precedence over the id's.
     """
+    from elbow_gym.task.settings import Settings
+
     chosen = {} if elbows is None else {"elbows": elbows}
     return Settings(**{**registered_arguments(env), **chosen, **(more or {})})
 

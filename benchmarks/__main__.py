@@ -1,27 +1,25 @@
-"""The command line: `python -m benchmarks energy | learning | optimal | speed`."""
+"""Commands of the benchmarks: `python -m benchmarks energy | learning | optimal | speed`."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import tyro
-
-from agents.cli import run
+from agents.cli import Commands, Count
 from benchmarks.machine import RESULTS
 
-app = tyro.extras.SubcommandApp()
+app = Commands("python -m benchmarks", "Benchmarks: what motion costs, how agents learn, the optimum, the speed.")
 
 
 @app.command
-def energy(output: Path = RESULTS, episodes: int = 20, fresh: bool = False) -> None:
+def energy(output: Path = RESULTS, episodes: Count = 20, fresh: bool = False) -> None:
     """Every controller in the regimes A, B and C: tables, CSV, JSON and figures.
 
     An interrupted run goes on where it stopped: what was measured with the same code and files is not measured again.
 
     Args:
-        output: folder for the results.
-        episodes: start poses, one fixed seed each.
-        fresh: measure everything again.
+        output: Folder for the results.
+        episodes: Number of episodes, each with a start pose of its own from a fixed seed.
+        fresh: Whether to measure everything again.
     """
     from benchmarks.energy.run import energy as measure_energy
 
@@ -33,7 +31,7 @@ def learning(output: Path = RESULTS) -> None:
     """The learning curves against steps and seconds, and when the PD was beaten: figure, CSV and table.
 
     Args:
-        output: folder of the results, with the curves in learning/ and energy.csv.
+        output: Folder of the results, with the curves in learning/ and energy.csv.
     """
     from benchmarks.learning import save
 
@@ -42,14 +40,14 @@ def learning(output: Path = RESULTS) -> None:
 
 
 @app.command
-def optimal(output: Path = RESULTS, fresh: bool = False, workers: int = 2, front: bool = True) -> None:
+def optimal(output: Path = RESULTS, fresh: bool = False, workers: Count = 2, front: bool = True) -> None:
     """The best possible return for each elbow count, the same under the table, and the front of energy against error.
 
     Args:
-        output: folder for the results; what was solved there before is kept.
-        fresh: solve everything again.
-        workers: processes, one problem each.
-        front: also the energy weights beside the default one.
+        output: Folder for the results; problems that were solved there before are kept.
+        fresh: Whether to solve everything again.
+        workers: Number of processes; each solves one problem at a time.
+        front: Whether to solve for the energy weights beside the default one too.
     """
     from benchmarks.optimal import optimal as solve_optimal
 
@@ -61,8 +59,8 @@ def speed(output: Path = RESULTS, quick: bool = False) -> None:
     """This project against MuJoCo, Pinocchio, NumPy and Gymnasium: table, CSV, JSON and a figure.
 
     Args:
-        output: folder for the results.
-        quick: few and short samples, to see that all works.
+        output: Folder for the results.
+        quick: Whether to take few and short samples, which show that all works.
     """
     from benchmarks.speed.run import speed as measure_speed
 
@@ -70,4 +68,4 @@ def speed(output: Path = RESULTS, quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
-    run(app, "python -m benchmarks", __doc__)
+    app.run()

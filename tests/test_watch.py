@@ -150,7 +150,7 @@ def test_wrong_argument_is_a_value_error_before_anything_is_written(arguments, m
 def test_command_line_writes_the_file_and_says_where(tmp_path, capsys):
     path = tmp_path / "table.gif"
     words = f"watch pd --env ElbowArmTable-v0 --speed 5 --size 160 120 --start on_target --output {path}"
-    app.cli(args=words.split())
+    app.run(words.split())
     assert capsys.readouterr().out == f"{path}\n"
     with Image.open(path) as gif:
         assert gif.n_frames == 2

@@ -1,106 +1,221 @@
-"""`python -m agents train`: its defaults depend on the algorithm and the task that the same line names."""
+"""Commands that train: `python -m agents train` and `python -m agents clone`."""
 
 from __future__ import annotations
 
+import io
 import json
-import sys
+import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from itertools import pairwise
+from contextlib import redirect_stderr
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 import tyro
+from tyro.conf import OmitArgPrefixes, subcommand
 
+from agents.cli import Count, JsonObject, Seed
+from agents.learning.clone_settings import CloneSettings
 from agents.learning.presets import ALGORITHMS, default_settings
 from agents.learning.settings import AlgorithmSettings
-from agents.tasks import task_name, task_settings
+
+if TYPE_CHECKING:
+    from agents.learning.run import Run
+    from elbow_gym.task.settings import Settings
 
 
-def train_command(line: Sequence[str]) -> Callable[..., None]:
-    """The command as a function whose settings have the defaults for the algorithm and task named in `line`."""
-    default = default_settings(*named(line))
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """Environment to train in. Its id and the elbows choose the defaults of the algorithm options."""
 
-    def train(
-        algorithm: tyro.conf.Positional[Literal["ppo", "sac"]],
-        /,
-        env: Literal["ElbowArm-v0", "ElbowArmTable-v0", "ElbowArmRandom-v0"] = "ElbowArm-v0",
-        elbows: int | None = None,
-        seeds: int = 1,
-        first_seed: int = 0,
-        workers: int = 2,
-        resume: bool = False,
-        output: Path = Path("runs"),
-        label: str = "",
-        environment: str = "{}",
-        initial_policy: Path | None = None,
-        minutes: float | None = None,
-        checkpoint_seconds: float = 60.0,
-        settings: AlgorithmSettings = default,
-    ) -> None:
+    env: Literal["ElbowArm-v0", "ElbowArmTable-v0", "ElbowArmRandom-v0"] = "ElbowArm-v0"
+    """Gymnasium id of the environment."""
+    elbows: int | None = None
+    """Number of elbows on the table; that of the id, or else 2, when None."""
+    environment: JsonObject = field(default_factory=dict)
+    """Further arguments of the environment, such as '{"energy_weight": 0.002}'."""
+
+    @property
+    def name(self) -> str:
+        """Short name of the task, such as "elbows2"."""
+        from agents.tasks import task_name
+
+        return task_name(self.env, self.elbows)
+
+    def settings(self) -> Settings:
+        """Settings of the environment.
+
+        Raises:
+            ValueError: `environment` holds an argument that no environment has, or elbows; or a value is refused.
+        """
+        from agents.tasks import task_settings
+        from elbow_gym.task.settings import Settings
+
+        allowed = sorted({field.name for field in fields(Settings)} - {"elbows"})
+        for name in self.environment:
+            if name not in allowed:
+                raise ValueError(f"--environment must hold only {', '.join(allowed)}, got {name} (elbows: --elbows)")
+        try:
+            return task_settings(self.env, self.elbows, self.environment)
+        except TypeError as error:
+            given = json.dumps(self.environment)
+            raise ValueError(f"--environment must hold values of the right type, got {given} ({error})") from error
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seeds:
+    """Seeds of the networks and their runs, a folder each."""
+
+    seeds: Count = 1
+    """Number of seeds."""
+    first_seed: Seed = 0
+    """First seed; the others follow it."""
+    resume: bool = False
+    """Whether runs go on from their last checkpoints; finished ones are left alone.
+    Without it, a folder that holds a run is refused."""
+    output: Path = Path("runs")
+    """Folder in which each run gets its own."""
+
+    @property
+    def all(self) -> range:
+        """The seeds."""
+        return range(self.first_seed, self.first_seed + self.seeds)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Schedule(Seeds):
+    """Number, duration and folders of the runs."""
+
+    workers: Count = 2
+    """Number of processes; each trains one seed at a time."""
+    label: str = ""
+    """Word in the folders' names after the algorithm, such as "cloned", for runs that differ from the plain ones."""
+    initial_policy: Path | None = None
+    """Policy whose weights the actor starts from; random weights, or those of a demonstration, when None."""
+    minutes: float | None = None
+    """Longest duration of each run [min], evaluations included; no limit when None."""
+    checkpoint_seconds: float = 60.0
+    """Time between two checkpoints of a run [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Teacher:
+    """Optimal trajectory to clone, and the environment that it is for."""
+
+    elbows: int = 2
+    """Number of elbows on the table."""
+    trajectory: Path | None = None
+    """File of the trajectory, as `python -m benchmarks optimal` writes it; the shipped one for the elbows when None."""
+
+
+def train_command(words: Sequence[str]) -> Callable[..., None]:
+    """The command `train`, whose algorithm options have the defaults of the task that the words name."""
+
+    def train(task: OmitArgPrefixes[Task], run: OmitArgPrefixes[Schedule], algorithm: AlgorithmSettings) -> None:
         """Trains agents, several seeds side by side; Ctrl-C keeps the best policies so far.
 
         Each seed has a folder OUTPUT/ALGORITHM[_LABEL]_TASK_seedK with its best policy, evaluations.csv, a checkpoint
-        and TensorBoard logs.
-
-        Args:
-            algorithm: the algorithm.
-            env: the environment's id.
-            elbows: elbows on the table; the id's own, or 2, when not given.
-            seeds: how many are trained.
-            first_seed: the first of them.
-            workers: processes, one seed each.
-            resume: go on from the last checkpoints; finished seeds are left alone.
-            output: folder of the runs.
-            label: goes into the names, for runs that are not the plain algorithm's, such as "cloned".
-            environment: more arguments of the environment as a JSON object, such as '{"energy_weight": 0.002}'.
-            initial_policy: a policy whose weights the actor starts from.
-            minutes: ends each seed's training after so many.
-            checkpoint_seconds: time between two checkpoints.
-            settings: the algorithm's settings; the defaults are those for the algorithm, env and elbows given.
+        and TensorBoard logs. `train ppo --help` lists the options of PPO.
         """
         from agents.learning.evaluation import sentence
-        from agents.learning.run import Run
         from agents.learning.train import train_all
 
-        chosen = task_settings(env, elbows, json.loads(environment))
-        name = "_".join(part for part in (algorithm, label, task_name(env, elbows)) if part)
-        print(f"{name}, seeds {first_seed} to {first_seed + seeds - 1}, into {output}: {settings}", flush=True)
-        first = Run(
-            algorithm=algorithm,
-            env=env,
-            environment=json.loads(json.dumps(chosen.arguments)),
-            settings=settings,
-            seed=first_seed,
-            folder=output,
-            minutes=minutes,
-            checkpoint_seconds=checkpoint_seconds,
-            initial_policy=initial_policy,
-            command=" ".join(["python -m agents", *sys.argv[1:]]),
-        )
-        runs = [
-            replace(first, seed=seed, folder=output / f"{name}_seed{seed}")
-            for seed in range(first_seed, first_seed + seeds)
-        ]
-        for result in train_all(runs, workers, resume):
+        runs = runs_of(task, run, algorithm, _spelled("train", words))
+        names = " to ".join(dict.fromkeys((runs[0].name, runs[-1].name)))
+        print(f"{names}, into {run.output}: {algorithm}", flush=True)
+        for result in train_all(runs, run.workers, run.resume):
             state = "finished" if result["finished"] else "not finished"
             print(f"{result['name']}: {state} after {result['steps']:,d} steps, best: {sentence(result['best'])}")
 
-    # The type decides which fields the command line has, and is known only now.
-    train.__annotations__["settings"] = Annotated[type(default), tyro.conf.arg(name="")]
+    # The defaults follow from the task, and are known only now.
+    train.__annotations__["algorithm"] = _algorithms(_named_task(words))
     return train
 
 
-def named(line: Sequence[str]) -> tuple[str, str]:
-    """The algorithm and the task that a command line names; what it leaves out, or gets wrong, counts as the default.
+def clone_command(words: Sequence[str]) -> Callable[..., None]:
+    """The command `clone`."""
 
-    Wrong values are left to the parser, which says what is allowed.
+    def clone(
+        teacher: OmitArgPrefixes[Teacher], run: OmitArgPrefixes[Seeds], imitation: OmitArgPrefixes[CloneSettings]
+    ) -> None:
+        """Clones the optimal trajectory and the LQR around it into networks, several seeds side by side.
+
+        Each seed has a folder OUTPUT/clone_elbowsN_seedK with its best policy and evaluations.csv.
+        """
+        from agents.control.trajectory import OPTIMA
+        from agents.learning.clone import clone_all
+        from elbow_gym.task.settings import Settings
+
+        settings = Settings(elbows=teacher.elbows)
+        folders = [run.output / f"clone_elbows{teacher.elbows}_seed{seed}" for seed in run.all]
+        source = OPTIMA / f"elbows{teacher.elbows}.npz" if teacher.trajectory is None else teacher.trajectory
+        command = _spelled("clone", words)
+        results = clone_all(settings, source, imitation, list(run.all), folders, command, run.resume)
+        for result in results.values():
+            print(f"{result['name']}: {result['training_seconds']:.0f} s, return {result['best']['return']:.2f}")
+
+    return clone
+
+
+def runs_of(task: Task, schedule: Schedule, settings: AlgorithmSettings, command: str) -> list[Run]:
+    """The runs that a command line asks for, one a seed.
+
+    Raises:
+        ValueError: an argument of the environment or of the runs is wrong, or there is no such initial policy.
     """
-    words = [word for part in line for word in part.split("=", 1)]
-    algorithm = next((word for word in words if word in ALGORITHMS), "ppo")
-    values: dict[str, Any] = dict(pairwise(words))
-    env, elbows = values.get("--env", "ElbowArm-v0"), values.get("--elbows", "")
+    from agents import load_policy
+    from agents.learning.run import Run
+
+    policy = schedule.initial_policy
+    if policy is not None:
+        if not policy.is_file() and not policy.with_name(f"{policy.name}.json").is_file():
+            raise ValueError(f"--initial-policy must be the path of a policy's files, got {policy}")
+        load_policy(policy)
+    algorithm = next(name for name, kind in ALGORITHMS.items() if isinstance(settings, kind))
+    name = "_".join(part for part in (algorithm, schedule.label, task.name) if part)
+    first = Run(
+        algorithm=algorithm,
+        env=task.env,
+        environment=json.loads(json.dumps(task.settings().arguments)),
+        settings=settings,
+        seed=schedule.first_seed,
+        folder=schedule.output,
+        minutes=schedule.minutes,
+        checkpoint_seconds=schedule.checkpoint_seconds,
+        initial_policy=schedule.initial_policy,
+        command=command,
+    )
+    return [replace(first, seed=seed, folder=schedule.output / f"{name}_seed{seed}") for seed in schedule.all]
+
+
+def _algorithms(task: str) -> Any:
+    """The algorithms as tyro's subcommands, with their settings for a task as defaults."""
+    defaults = {name: default_settings(name, task) for name in ALGORITHMS}
+    kinds = [
+        Annotated[
+            type(default),
+            subcommand(name, default=default, description=_first_line(type(default)), prefix_name=False),
+            OmitArgPrefixes,
+        ]
+        for name, default in defaults.items()
+    ]
+    return Union[tuple(kinds)]  # noqa: UP007  their number is known only here
+
+
+def _named_task(words: Sequence[str]) -> str:
+    """Name of the task that a command line asks for; the usual one where it is wrong, which the whole parse reports."""
     try:
-        return algorithm, task_name(env, int(elbows) if elbows.isdigit() else None)
-    except ValueError:
-        return algorithm, "elbows2"
+        with redirect_stderr(io.StringIO()):
+            task, _ = tyro.cli(Task, args=words, return_unknown_args=True, add_help=False)
+        return task.name
+    except (SystemExit, ValueError):
+        return Task().name
+
+
+def _first_line(documented: Any) -> str:
+    return documented.__doc__.split("\n")[0]
+
+
+def _spelled(command: str, words: Sequence[str]) -> str:
+    """The command line as a shell takes it, for the cards of policies."""
+    return shlex.join(["python", "-m", "agents", command, *words])

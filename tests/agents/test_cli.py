@@ -1,0 +1,190 @@
+"""Commands of a program: the first word chooses one, errors end with a line, and each has its own help."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Literal
+
+import pytest
+
+from agents.cli import Commands, Count, JsonObject, Seed
+
+ROOT = Path(__file__).parents[2]
+COMMANDS = {
+    "agents": ("reproduce", "train", "clone", "publish", "evaluate", "report", "watch"),
+    "benchmarks": ("energy", "learning", "optimal", "speed"),
+}
+
+
+NOTHING = {}
+
+
+@pytest.fixture
+def app():
+    app = Commands("program", "What it is for.")
+
+    @app.command
+    def add(first: Seed, count: Count = 1, more: JsonObject = NOTHING, sign: Literal["plus", "minus"] = "plus") -> None:
+        """Adds numbers.
+
+        A second paragraph.
+
+        Args:
+            first: First number, whose text is so long that the line breaks in the source, where a reader of the help
+                sees none.
+            count: Number of numbers.
+            more: More numbers by name.
+            sign: Operation.
+        """
+        print(first, count, more, sign)
+
+    @app.command_from
+    def echo(words):
+        """Says a word that depends on the words."""
+
+        def said(loud: bool = "loud" in words, word: str = "") -> None:
+            if word == "bad":
+                raise ValueError("word must be good, got bad")
+            print(loud, word)
+
+        return said
+
+    return app
+
+
+def test_first_word_chooses_the_command_and_the_others_are_its_options(app, capsys):
+    app.run(["add", "--first", "3", "--more", '{"a": 1}', "--sign", "minus"])
+    app.run(["echo", "--word", "loud"])
+    assert capsys.readouterr().out == "3 1 {'a': 1} minus\nTrue loud\n"
+
+
+def test_parsing_makes_no_call(app, capsys):
+    call = app.parse(["add", "--first", "3"])
+    assert capsys.readouterr().out == ""
+    call()
+    assert capsys.readouterr().out == "3 1 {} plus\n"
+
+
+@pytest.mark.parametrize("word", ["-h", "--help"])
+def test_help_lists_the_commands_with_a_line_each(app, capsys, word):
+    with pytest.raises(SystemExit) as end:
+        app.run([word])
+    assert end.value.code == 0
+    said = capsys.readouterr().out
+    assert "usage: program [-h] COMMAND ..." in said
+    assert "\n  add   Adds numbers.\n  echo  Says a word that depends on the words.\n" in said
+    assert "second paragraph" not in said
+
+
+def test_help_of_a_command_joins_the_lines_of_an_argument(app, capsys):
+    with pytest.raises(SystemExit) as end:
+        app.run(["add", "--help"])
+    assert end.value.code == 0
+    said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "usage: program add [-h] --first INT [--count INT] [--more JSON]" in said
+    assert "A second paragraph." in said
+    assert "where a reader of the help sees none." in said
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "command must be one of add, echo, got none"),
+        (["ad"], "command must be one of add, echo, got ad"),
+        (["add"], "Missing from program add: --first INT; see program add --help"),
+        (["add", "--first", "-1"], "--first must be an integer of at least 0, got -1; see program add --help"),
+        (["add", "--first", "1", "--count", "0"], "--count must be a positive integer, got 0; see program add --help"),
+        (["add", "--first", "1", "--count", "x"], "--count must be a positive integer, got x; see program add --help"),
+        (["add", "--first", "1", "--more", "[]"], "--more must be a JSON object, got []; see program add --help"),
+        (
+            ["add", "--first", "1", "--sign", "times"],
+            "invalid choice 'times' for argument '--sign'. Expected one of ('plus', 'minus'); see program add --help",
+        ),
+        (
+            ["add", "--first", "1", "--cout", "2"],
+            "Unrecognized options: --cout, 2; perhaps --count is meant; see program add --help",
+        ),
+    ],
+)
+def test_wrong_words_end_with_one_line_and_status_two(app, capsys, words, message):
+    with pytest.raises(SystemExit) as end:
+        app.run(words)
+    assert end.value.code == 2
+    assert capsys.readouterr().err == f"error: {message}\n"
+
+
+def test_refusal_by_the_command_ends_with_one_line(app):
+    with pytest.raises(SystemExit, match=r"^error: word must be good, got bad$"):
+        app.run(["echo", "--word", "bad"])
+
+
+def test_line_is_plain_on_a_coloured_terminal():
+    pty = pytest.importorskip("pty")
+    terminal, stdout = pty.openpty()
+    words = [sys.executable, "-m", "agents", "train", "ppo", "--seeds", "0"]
+    ran = subprocess.run(words, cwd=ROOT, stdout=stdout, stderr=subprocess.PIPE, check=False)
+    os.close(stdout)
+    os.close(terminal)
+    assert ran.returncode == 2
+    assert ran.stderr == b"error: --seeds must be a positive integer, got 0; see python -m agents train --help\n"
+
+
+def said_by(*words):
+    environment = {**os.environ, "PYTHONUTF8": "1", "COLUMNS": "80"}
+    command = [sys.executable, *words]
+    ran = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, encoding="utf-8", check=False)
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stderr == ""
+    return ran.stdout
+
+
+@pytest.mark.parametrize("program", COMMANDS)
+def test_help_of_a_program_lists_its_commands(program):
+    said = said_by("-m", program, "--help")
+    assert said.startswith(f"usage: python -m {program} ")
+    assert re.findall(r"^  (\w+) +\S", said, re.MULTILINE) == list(COMMANDS[program])
+    assert max(map(len, said.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(("program", "command"), [(name, one) for name, all_ in COMMANDS.items() for one in all_])
+def test_help_of_a_command_shows_its_own_usage(program, command):
+    said = said_by("-m", program, command, "--help")
+    assert said.startswith(f"usage: python -m {program} {command} [-h]")
+    assert said.count("usage:") == 1
+
+
+def groups(said):
+    """Names of the options by the title of their box."""
+    boxes = re.findall(r"╭─ ([\w ]+?) ─+╮\n(.*?)╰", said, re.DOTALL)
+    return {title: set(re.findall(r"^│ (--[\w-]+)", body, re.MULTILINE)) for title, body in boxes}
+
+
+def test_help_of_an_algorithm_groups_its_options_apart_and_shows_the_defaults_that_apply():
+    found = groups(said := said_by("-m", "agents", "train", "ppo", "--help"))
+    assert found["task options"] == {"--env", "--elbows", "--environment"}
+    assert {"--seeds", "--output", "--label"} <= found["run options"]
+    assert {"--total-timesteps", "--gamma", "--clip-range"} <= found["algorithm options"]
+    assert "--tau" not in said
+    flat = " ".join(said_by("-m", "agents", "train", "ppo", "--elbows", "1", "--help").replace("│", " ").split())
+    assert "summed over all arms. (default: 5000000)" in flat
+    assert "summed over all arms. (default: 2500000)" in " ".join(said.replace("│", " ").split())
+
+
+HEAVY = ("numba", "torch", "scipy", "matplotlib", "stable_baselines3", "rich")
+
+
+def test_help_loads_no_compiler_and_no_learning_library():
+    code = f"""
+import contextlib, io, sys
+from agents.__main__ import app as agents
+from benchmarks.__main__ import app as benchmarks
+for app, names in ((agents, {COMMANDS["agents"]}), (benchmarks, {COMMANDS["benchmarks"]})):
+    for words in ([], *([name] for name in names), ["train", "ppo"]):
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            with contextlib.suppress(SystemExit):
+                app.parse([*words, "--help"])
+print([name for name in {HEAVY} if name in sys.modules])
+"""
+    assert said_by("-c", code) == "[]\n"
