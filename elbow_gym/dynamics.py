@@ -1,6 +1,6 @@
 """The paper as printed: one arm, NumPy, one function per equation. Slow and clear on purpose.
 
-The compiled fast form in `kernel.py` is derived another way; tests prove the two equal.
+The compiled fast form in `kernel/` is derived another way; tests prove the two equal.
 """
 
 from __future__ import annotations

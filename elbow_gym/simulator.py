@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from elbow_gym import kernel
+from elbow_gym.kernel.build import kernel
+from elbow_gym.kernel.rows import (
+    LARGEST_ANGLE,
+    MAXIMUM_ELBOWS,
+    STATE_ROWS,
+    SUMMARY_COLUMNS,
+    SWITCHED_STATE,
+    SWITCHED_STATE_ROWS,
+    VALID,
+)
+from elbow_gym.kernel.slots import BLOCK_LANES
 from elbow_gym.kinematics import elbow_heights, pitches
 from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows, positive
 from elbow_gym.simulation.options import Conditions
@@ -48,8 +58,8 @@ class Simulator(Readings):
     ) -> None:
         self.arm = as_arm(arm)
         self.elbows = as_elbows(elbows, self.arm.n_joints)
-        if len(self.elbows) > kernel.MAXIMUM_ELBOWS:
-            raise ValueError(f"elbows must be at most {kernel.MAXIMUM_ELBOWS}, got {len(self.elbows)}")
+        if len(self.elbows) > MAXIMUM_ELBOWS:
+            raise ValueError(f"elbows must be at most {MAXIMUM_ELBOWS}, got {len(self.elbows)}")
         for name, count in (("num_envs", num_envs), ("num_threads", num_threads)):
             if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 1:
                 raise ValueError(f"{name} must be a positive integer, got {count!r}")
@@ -66,9 +76,9 @@ class Simulator(Readings):
         }
         n = self.arm.n_joints
         self._elbow_index = np.array(self.elbows, dtype=np.int64)
-        rows = kernel.SWITCHED_STATE_ROWS if any(self._switches.values()) else kernel.STATE_ROWS
+        rows = SWITCHED_STATE_ROWS if any(self._switches.values()) else STATE_ROWS
         self._state = np.zeros((self.num_envs, rows, n))
-        self._summary = np.zeros((self.num_envs, kernel.SUMMARY_COLUMNS + len(self.elbows)))
+        self._summary = np.zeros((self.num_envs, SUMMARY_COLUMNS + len(self.elbows)))
         self._parameters = np.repeat(parameter_table(self.arm, self.conditions)[None], self.num_envs, axis=0)
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
         self._num_threads = int(num_threads)
@@ -80,13 +90,17 @@ class Simulator(Readings):
 
     def _attach(self) -> None:
         # Up to two arms the lanes of a block would mostly idle.
-        lanes = 1 if self.num_envs <= 2 else kernel.BLOCK_LANES
-        self._advance, _, self._settle = kernel.kernel(lanes, **self._switches)
+        lanes = 1 if self.num_envs <= 2 else BLOCK_LANES
+        self._advance, _, self._project_poses = kernel(lanes, **self._switches)
         self._sharing = Sharing(self.num_envs, lanes, self._num_threads)
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the compiled functions and the threads, for pickling and copying."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("_advance", "_settle", "_sharing")}
+        return {
+            name: value
+            for name, value in self.__dict__.items()
+            if name not in ("_advance", "_project_poses", "_sharing")
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -113,16 +127,16 @@ class Simulator(Readings):
         q, q_dot, current, rise, chosen = self.check_state(q, q_dot, current, mask, temperature_rise)
         self._state[chosen] = 0.0
         if self.conditions.heat:
-            self._state[chosen, kernel.STATE_ROWS + kernel.SWITCHED_STATE.index("temperature_rise")] = rise[chosen]
+            self._state[chosen, STATE_ROWS + SWITCHED_STATE.index("temperature_rise")] = rise[chosen]
         self._state[chosen, 0] = q[chosen]
         self._state[chosen, 1] = q_dot[chosen]
         self._state[chosen, 2] = current[chosen]
-        valid = self._summary[:, kernel.VALID].copy()
+        valid = self._summary[:, VALID].copy()
         self._summary[chosen] = 0.0
         self._steps[chosen] = 0
         self._run(np.zeros(q.shape), 0)
         # Looking at the other arms' last state again does not make it the outcome of their last step.
-        self._summary[~chosen, kernel.VALID] = valid[~chosen]
+        self._summary[~chosen, VALID] = valid[~chosen]
 
     def parameters(self, chosen: NDArray[np.int64]) -> Array:
         """A copy of the kernel's parameter rows of some arms, (k, PARAMETER_ROWS, n)."""
@@ -139,8 +153,8 @@ class Simulator(Readings):
         """
         settled = as_batch("q", q, (self.num_envs, self.arm.n_joints)).copy()
         if self.elbows:
-            self._settle(settled, self._parameters, self._elbow_index)
-            if not (np.abs(settled).max() < kernel.LARGEST_ANGLE):
+            self._project_poses(settled, self._parameters, self._elbow_index)
+            if not (np.abs(settled).max() < LARGEST_ANGLE):
                 raise ValueError(f"q must be near a pose with the elbows {self.elbows} at z = 0, got {q!r}")
             self._check_on_table(settled, np.zeros_like(settled), self._parameters[:, 0])
         return settled
@@ -165,8 +179,8 @@ class Simulator(Readings):
         chosen = np.ones(self.num_envs, dtype=np.bool_) if mask is None else np.asarray(mask, dtype=np.bool_)
         if chosen.shape != (self.num_envs,):
             raise ValueError(f"mask must have shape {(self.num_envs,)}, got {chosen.shape}")
-        if np.abs(q).max() >= kernel.LARGEST_ANGLE:
-            raise ValueError(f"q must be within {kernel.LARGEST_ANGLE:g} rad, got {np.abs(q).max():g}")
+        if np.abs(q).max() >= LARGEST_ANGLE:
+            raise ValueError(f"q must be within {LARGEST_ANGLE:g} rad, got {np.abs(q).max():g}")
         if self.elbows:
             self._check_on_table(q[chosen], q_dot[chosen], self._parameters[chosen, 0])
         return q, q_dot, current, rise, chosen

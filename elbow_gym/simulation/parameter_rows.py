@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elbow_gym import kernel
+from elbow_gym.kernel.rows import PARAMETERS
 from elbow_gym.parameters import (
     ArmParameters,
     Array,
@@ -75,7 +75,7 @@ def parameter_rows(
         "sag": (conditions.supply_resistance / np.asarray(supply_voltage) ** 2)[..., None] * one,
         "bus_floor": (NO_FLOOR if conditions.regeneration else 0.0) * one,
     }
-    return np.stack([rows[name] for name in kernel.PARAMETERS], axis=-2)
+    return np.stack([rows[name] for name in PARAMETERS], axis=-2)
 
 
 def parameter_table(arm: ArmParameters, conditions: Conditions | None = None) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym import kernel
+from elbow_gym.kernel import observe
 from elbow_gym.parameters import Array
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.arm_batch import Population
@@ -72,7 +72,7 @@ class Extras:
         supply = self._population.values["supply_voltage"]
         highest, volts = (self._one, supply) if self._settings.action_unit == "fraction" else (supply, self._one)
         asked = np.empty_like(action)
-        if not kernel.drive(action, highest, volts, asked):
+        if not observe.drive(action, highest, volts, asked):
             raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
         if not self._longest_delay:
             return asked

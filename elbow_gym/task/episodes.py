@@ -9,7 +9,8 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym import kernel
+from elbow_gym.kernel import observe
+from elbow_gym.kernel.rows import FIGURES
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.parameters import Array, check_entries
 from elbow_gym.simulator import Simulator
@@ -23,7 +24,7 @@ from elbow_gym.task.targets import Targets
 RESET_OPTIONS = ("state", "phase", "circle", "parameters")
 STATE_ENTRIES = ("q", "q_dot", "current", "temperature_rise")
 # The last figure is the reward itself.
-INFO_FIGURES = kernel.FIGURES[:-1]
+INFO_FIGURES = FIGURES[:-1]
 
 
 class Outcome(NamedTuple):
@@ -197,7 +198,7 @@ class Episodes:
         sight.figure("reward_tracking")[terminated] = tracking
         sight.figure("reward_energy")[terminated] = -self.energy_weight * (worst_power * rest)
         fused = [
-            kernel.fused(-worst_power * left, self.energy_weight, term)
+            observe.fused(-worst_power * left, self.energy_weight, term)
             for left, term in zip(rest, tracking, strict=True)
         ]
         sight.figure("reward")[terminated] = fused

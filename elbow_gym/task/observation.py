@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from elbow_gym import kernel
+from elbow_gym.kernel import observe
+from elbow_gym.kernel.rows import FIGURES
 from elbow_gym.parameters import Array
 from elbow_gym.simulator import Simulator
 
@@ -143,11 +144,11 @@ class Sight(NamedTuple):
     observation: NDArray[np.float32]
     """(B, size), scaled and saturated."""
     figures: Array
-    """Rows of `kernel.FIGURES`: energies [J] and time under the table [s] since the reset, summed over the joints."""
+    """Rows of `FIGURES`: energies [J] and time under the table [s] since the reset, summed over the joints."""
 
     def figure(self, name: str) -> Array:
         """A row of the figures by name, (B,)."""
-        return self.figures[kernel.FIGURES.index(name)]
+        return self.figures[FIGURES.index(name)]
 
 
 def looking(
@@ -164,10 +165,10 @@ def looking(
         spent: energy paid before this control step [J], (B,), brought up to date.
     """
     arms = simulator.num_envs
-    sight = Sight(np.empty((arms, layout.size), np.float32), np.empty((len(kernel.FIGURES), arms)))
+    sight = Sight(np.empty((arms, layout.size), np.float32), np.empty((len(FIGURES), arms)))
 
     def look(first: int, end: int) -> None:
-        kernel.observe(
+        observe.observe(
             *simulator.raw, pose, *target, layout.scale, layout.high, tuple(price), spent, *sight, first, end
         )
 
