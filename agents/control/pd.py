@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from elbow_gym.checks import positive
 from elbow_gym.env import ElbowArmEnv
 from elbow_gym.kinematics import inverse_kinematics
-from elbow_gym.parameters import positive
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 PAPER_KP = 500.0

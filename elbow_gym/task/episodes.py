@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from elbow_gym import kernel
+from elbow_gym.checks import check_entries, check_restorable, require_entries, restore
 from elbow_gym.kinematics import inverse_kinematics
-from elbow_gym.parameters import Array, check_entries
+from elbow_gym.parameters import Array
 from elbow_gym.simulator import Simulator
 from elbow_gym.task import observation as task
 from elbow_gym.task.actuation_and_sensing import Extras
@@ -242,18 +243,13 @@ class Episodes:
     def set_state(self, state: Mapping[str, Any], generators: Sequence[np.random.Generator]) -> None:
         """Takes a state of `get_state` from episodes of the same settings and size, and each arm's generator."""
         own = {"steps": self._steps, "spent": self._spent, "queue": self.extras.queue}
-        for name in (*own, "simulator", "targets", "parameters"):
-            if name not in state:
-                raise ValueError(f"state must have the entry {name!r}, got {sorted(state)}")
-        for name, array in own.items():
-            if np.shape(state[name]) != array.shape:
-                raise ValueError(f"state[{name!r}] must have shape {array.shape}, got {np.shape(state[name])}")
+        require_entries(state, (*own, "simulator", "targets", "parameters"), "state")
+        check_restorable(own, state)
         self.simulator.set_state(state["simulator"])
         self.targets.set_state(state["targets"])
         everyone = np.arange(self.num_envs)
         self.simulator.set_parameters(everyone, self.population.put(everyone, state["parameters"]))
-        for name, array in own.items():
-            array[...] = state[name]
+        restore(own, state)
         self.extras.listen(everyone, generators)
 
 
@@ -265,6 +261,5 @@ def given_state(state: object) -> dict[str, Any] | None:
         raise ValueError(f"options['state'] must be a dict, got {state!r}")
     plain = cast("Mapping[str, Any]", state)
     check_entries(plain, set(STATE_ENTRIES), "options['state']")
-    if "q" not in plain:
-        raise ValueError(f"options['state'] must have the entry 'q', got {sorted(plain)}")
+    require_entries(plain, ("q",), "options['state']")
     return dict(plain)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from elbow_gym.checks import restore
 from elbow_gym.parameters import Array
 from elbow_gym.task.circle import Circle, as_phase
 from elbow_gym.task.observation import LOOKAHEAD, Target
@@ -94,12 +95,7 @@ class Targets:
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Takes a state of `get_state`. ValueError when it is of another number of arms or shape of path."""
         own = {"path": self._path, "rate": self._rate, "phase": self._phase}
-        for name, array in own.items():
-            if name not in state or np.shape(state[name]) != array.shape:
-                got = np.shape(state[name]) if name in state else "nothing"
-                raise ValueError(f"state[{name!r}] must have shape {array.shape}, got {got}")
-        for name, array in own.items():
-            array[...] = state[name]
+        restore(own, state)
         self._pace()
         self.circles = list(state["circles"])
         self._alike = bool((self._path == self._path[0]).all())
