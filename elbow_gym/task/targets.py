@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,18 @@ from numpy.typing import NDArray
 from elbow_gym.checks import restore
 from elbow_gym.parameters import Array
 from elbow_gym.task.circle import Circle, as_phase
-from elbow_gym.task.observation import LOOKAHEAD, Target
+from elbow_gym.task.observation import LOOKAHEAD
+
+
+class Target(NamedTuple):
+    """What the hands of B arms should follow, at an instant."""
+
+    path: Array
+    """Each arm's path as Fourier rows [m], (B, rows, 3)."""
+    angle: Array
+    """Where the target stands on it [rad], (B,)."""
+    lookahead: Array
+    """Angle between the target and the look-ahead target [rad], (B,)."""
 
 
 class Targets:
