@@ -76,7 +76,7 @@ def clone(
 
 @app.command
 def publish(runs: tyro.conf.Positional[tuple[Path, ...]], /, replace_seeds: bool = False) -> None:
-    """Takes finished runs over: best policies into agents/policies, curves into benchmarks/results/learning.
+    """Takes finished runs over into the shipped policies and learning curves; a task's best seed is its baseline.
 
     Args:
         runs: folders of the runs, as the training named them.

@@ -20,6 +20,13 @@ SOURCES = sorted(
     for path in (ROOT / room).rglob("*.py")
 )
 MODULES = [path for path in SOURCES if path.startswith("elbow_gym/") and not path.endswith("__init__.py")]
+LEARNING = ("torch", "stable_baselines3", "matplotlib", "tensorboard")
+
+
+def loaded_by(statements, *names):
+    """Which of the modules a fresh process has loaded after the statements."""
+    code = f"import sys; {statements}; print(*[name for name in {names} if name in sys.modules])"
+    return subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
 
 
 def test_rooms_and_floors_import_only_from_below(monkeypatch):
@@ -28,10 +35,12 @@ def test_rooms_and_floors_import_only_from_below(monkeypatch):
 
 
 def test_importing_the_package_loads_nothing_heavy():
-    heavy = ["numba", "pygame", "torch", "scipy", "matplotlib", "stable_baselines3"]
-    code = f"import sys, elbow_gym; print([name for name in {heavy} if name in sys.modules])"
-    ran = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert ran.stdout == "[]\n"
+    assert loaded_by("import elbow_gym", "numba", "pygame", "scipy", *LEARNING) == []
+
+
+def test_a_policy_plays_without_a_learning_library():
+    play = "import elbow_gym; p = elbow_gym.load_policy('ppo', elbows=2); p.predict([0.0] * p.card.layers[0])"
+    assert loaded_by(play, *LEARNING) == []
 
 
 def test_compiled_code_stands_in_the_kernel_alone():

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.control.pd import CLIPPED, UNLIMITED, PDController
 from agents.evaluation.metrics import joint_energies, metrics
 from agents.evaluation.recording import Recording, record, thinned
 from agents.files import write_csv, write_text, write_whole
@@ -18,6 +17,7 @@ from agents.paper.claims import Claim, Numbers, as_markdown, verdict
 from agents.paper.figures import CASES, SETTLED, draw, write_series
 from agents.style import ELBOW_NAMES
 from agents.workers import Job, in_processes
+from elbow_gym.baselines.pd import CLIPPED, UNLIMITED, PDController
 from elbow_gym.parameters import as_elbows
 from elbow_gym.task.settings import Settings
 

@@ -12,7 +12,7 @@ from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import Trajectory
 from agents.evaluation.players import CLASSICAL, named_controller
 from agents.paper.figures import CASES
-from agents.policy import shipped_policies
+from agents.shipped.seeds import shipped_policies
 from agents.tasks import POLICY_NAME
 from elbow_gym.task.settings import STARTS, Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv

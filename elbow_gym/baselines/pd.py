@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,7 @@ class PDController:
 
     def __init__(self, env: ElbowArmEnv | ElbowArmVectorEnv, kp: float = PAPER_KP, kd: float = PAPER_KD) -> None:
         self.kp, self.kd = positive("kp", kp), positive("kd", kd)
-        episodes = env.unwrapped.episodes
+        episodes = cast("ElbowArmEnv | ElbowArmVectorEnv", env.unwrapped).episodes
         # A drawn circle is another one in each episode.
         self._layout, self._circle = episodes.layout, episodes.targets if episodes.circle.random else episodes.circle
         self._arm, self._pose = episodes.arm, episodes.pose
