@@ -61,8 +61,8 @@ def clone(
         trajectory: what is cloned; the benchmark's optimum for the elbow count when not given.
         settings: of the imitation.
     """
-    from agents.control.trajectory import OPTIMA
     from agents.learning.clone import clone_all
+    from agents.shipped import OPTIMA
     from elbow_gym.task.settings import Settings
 
     chosen = list(range(first_seed, first_seed + seeds))

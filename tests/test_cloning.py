@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from agents.control.lqr import TimeVaryingLQR
-from agents.control.trajectory import OPTIMA, Trajectory
+from agents.control.trajectory import Trajectory
 from agents.learning.clone import clone, clone_all
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.evaluation import evaluation
 from agents.learning.publish import publish
+from agents.shipped import OPTIMA
 from elbow_gym.baselines.policy import read_policy
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv

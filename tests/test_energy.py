@@ -61,6 +61,7 @@ def measured(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(energy, "cells", lambda: QUICK)
         patch.setattr(energy, "sweep", list)
+        patch.setattr(energy.learning, "save", lambda folder: None)
         rows = energy.energy(folder, episodes=2, folder=folder / "cache", parallel=False)
     return folder, rows
 

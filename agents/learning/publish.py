@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from agents.files import write_whole
-from agents.shipped import POLICIES
+from agents.shipped import CURVES, POLICIES
 from elbow_gym.baselines.policy import BASELINES, pair, read_policy
 from elbow_gym.baselines.tasks import task_name
 
-CURVES = Path(__file__).parents[2] / "benchmarks" / "results" / "learning"
 LARGEST = 300_000
 """Of a shipped policy's two files together [B]."""
 

@@ -21,7 +21,7 @@ from elbow_gym.baselines.pd import CLIPPED, UNLIMITED, PDController
 from elbow_gym.parameters import as_elbows
 from elbow_gym.task.settings import Settings
 
-RESULTS = Path(__file__).resolve().parents[2] / "benchmarks" / "results"
+RESULTS = Path(__file__).parent / "results"
 RECORD_PERIOD = 2e-4
 """At most, between the instants that the numbers are taken from [s]; keeping every period takes longer to run."""
 PICTURE_PERIOD = 0.002
@@ -83,7 +83,7 @@ def reproduce(output: Path = Path("reproduction"), publish: bool = False) -> Rep
 
     Args:
         output: folder for fig01.png to fig25.png, paper_cases.png, series.csv, numbers.csv and verdict.md.
-        publish: also refresh the README's picture and numbers under benchmarks/results.
+        publish: also refresh the README's picture and the numbers in agents/paper/results.
     """
     from rich.console import Console
     from rich.markdown import Markdown
