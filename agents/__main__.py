@@ -61,8 +61,8 @@ def clone(
         trajectory: what is cloned; the benchmark's optimum for the elbow count when not given.
         settings: of the imitation.
     """
-    from agents.control.trajectory import OPTIMA
     from agents.learning.clone import clone_all
+    from agents.shipped import OPTIMA
     from elbow_gym.task.settings import Settings
 
     chosen = list(range(first_seed, first_seed + seeds))
@@ -76,7 +76,7 @@ def clone(
 
 @app.command
 def publish(runs: tyro.conf.Positional[tuple[Path, ...]], /, replace_seeds: bool = False) -> None:
-    """Takes finished runs over: best policies into agents/policies, curves into benchmarks/results/learning.
+    """Takes finished runs over into the shipped policies and learning curves; a task's best seed is its baseline.
 
     Args:
         runs: folders of the runs, as the training named them.

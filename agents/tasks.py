@@ -1,4 +1,4 @@
-"""What is trained for: the registered environments and the elbow counts, by the short names that files carry."""
+"""What is trained for: the settings of the registered environments, and the names of files that hold the results."""
 
 from __future__ import annotations
 
@@ -6,40 +6,20 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-import elbow_gym  # noqa: F401  registers the environments
+from elbow_gym.baselines.tasks import registered_arguments
 from elbow_gym.task.settings import Settings
 
-ENVIRONMENTS = {"ElbowArm-v0": "elbows", "ElbowArmTable-v0": "table", "ElbowArmRandom-v0": "random"}
-"""Ids of the environments and what a task in them is called; the elbow count follows "elbows"."""
 POLICY_NAME = re.compile(r"(?P<controller>[a-z]+(_[a-z]+)??)_(?P<task>elbows\d+|table|random)")
 """What files of policies and curves are called before "_seedK": ALGORITHM[_LABEL]_TASK."""
-
-
-def registered_arguments(env: str) -> dict[str, Any]:
-    """The arguments that an id stands for. Raises ValueError for an id that is not in `ENVIRONMENTS`."""
-    from gymnasium import spec
-
-    if env not in ENVIRONMENTS:
-        raise ValueError(f"env must be one of {list(ENVIRONMENTS)}, got {env!r}")
-    return dict(spec(env).kwargs)
 
 
 def task_settings(env: str, elbows: int | None = None, more: Mapping[str, Any] | None = None) -> Settings:
     """`Settings` of a registered environment.
 
     Args:
-        env: one of `ENVIRONMENTS`.
+        env: one of `elbow_gym.baselines.tasks.ENVIRONMENTS`.
         elbows: elbows on the table; the id's own, or 2, when None.
         more: arguments that go before the id's.
     """
     chosen = {} if elbows is None else {"elbows": elbows}
     return Settings(**{**registered_arguments(env), **chosen, **(more or {})})
-
-
-def task_name(env: str, elbows: int | None = None) -> str:
-    """Short name of a task: "elbows0", "elbows1", "elbows2", "table", "random"; others as "random_elbows1"."""
-    given = registered_arguments(env).get("elbows", 2)
-    count = given if elbows is None else elbows
-    if env == "ElbowArm-v0":
-        return f"elbows{count}"
-    return ENVIRONMENTS[env] if count == given else f"{ENVIRONMENTS[env]}_elbows{count}"

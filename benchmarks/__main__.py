@@ -7,6 +7,7 @@ from pathlib import Path
 import tyro
 
 from agents.cli import run
+from agents.shipped import CURVES, OPTIMA
 from benchmarks.machine import RESULTS
 
 app = tyro.extras.SubcommandApp()
@@ -29,31 +30,35 @@ def energy(output: Path = RESULTS, episodes: int = 20, fresh: bool = False) -> N
 
 
 @app.command
-def learning(output: Path = RESULTS) -> None:
+def learning(output: Path = RESULTS, curves: Path = CURVES) -> None:
     """The learning curves against steps and seconds, and when the PD was beaten: figure, CSV and table.
 
     Args:
-        output: folder of the results, with the curves in learning/ and energy.csv.
+        output: folder of the results, with energy.csv.
+        curves: folder of the learning curves.
     """
     from benchmarks.learning import save
 
-    for row in save(output):
+    for row in save(output, curves):
         print("  ".join(row))
 
 
 @app.command
-def optimal(output: Path = RESULTS, fresh: bool = False, workers: int = 2, front: bool = True) -> None:
+def optimal(
+    output: Path = RESULTS, optima: Path = OPTIMA, fresh: bool = False, workers: int = 2, front: bool = True
+) -> None:
     """The best possible return for each elbow count, the same under the table, and the front of energy against error.
 
     Args:
-        output: folder for the results; what was solved there before is kept.
+        output: folder for the summary.
+        optima: folder of the solutions; what was solved there before is kept.
         fresh: solve everything again.
         workers: processes, one problem each.
         front: also the energy weights beside the default one.
     """
     from benchmarks.optimal import optimal as solve_optimal
 
-    solve_optimal(output, fresh, workers, front)
+    solve_optimal(output, optima, fresh, workers, front)
 
 
 @app.command

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import numbers
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from elbow_gym.checks import as_batch, positive, positive_integer, restore
 from elbow_gym.kernel.build import kernel
 from elbow_gym.kernel.rows import (
     LARGEST_ANGLE,
@@ -21,9 +21,9 @@ from elbow_gym.kernel.rows import (
 )
 from elbow_gym.kernel.slots import BLOCK_LANES
 from elbow_gym.kinematics import elbow_heights, pitches
-from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows, positive
+from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
 from elbow_gym.simulation.options import Conditions
-from elbow_gym.simulation.parameter_rows import as_batch, parameter_table
+from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.simulation.state_views import Readings
 from elbow_gym.simulation.thread_pool import Sharing
 
@@ -60,10 +60,8 @@ class Simulator(Readings):
         self.elbows = as_elbows(elbows, self.arm.n_joints)
         if len(self.elbows) > MAXIMUM_ELBOWS:
             raise ValueError(f"elbows must be at most {MAXIMUM_ELBOWS}, got {len(self.elbows)}")
-        for name, count in (("num_envs", num_envs), ("num_threads", num_threads)):
-            if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 1:
-                raise ValueError(f"{name} must be a positive integer, got {count!r}")
-        self.num_envs = int(num_envs)
+        self.num_envs = positive_integer("num_envs", num_envs)
+        self._num_threads = positive_integer("num_threads", num_threads)
         self.conditions = Conditions(**conditions)
         self.timestep = positive("timestep", timestep)
         limit, reason = self.conditions.longest_timestep(self.arm)
@@ -81,7 +79,6 @@ class Simulator(Readings):
         self._summary = np.zeros((self.num_envs, SUMMARY_COLUMNS + len(self.elbows)))
         self._parameters = np.repeat(parameter_table(self.arm, self.conditions)[None], self.num_envs, axis=0)
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
-        self._num_threads = int(num_threads)
         self._attach()
         self._nominal = as_batch("nominal_pose", self.arm.nominal_pose, (self.num_envs, n))
         if self.elbows and np.abs(elbow_heights(self.arm, self.arm.nominal_pose, self.elbows)).max() > PLANE_TOLERANCE:
@@ -204,9 +201,7 @@ class Simulator(Readings):
         Raises ValueError, with the state untouched, on a wrong shape, a non-finite voltage or n_substeps < 1.
         """
         voltage = as_batch("voltage", voltage, (self.num_envs, self.arm.n_joints))
-        if isinstance(n_substeps, bool) or not isinstance(n_substeps, numbers.Integral) or n_substeps < 1:
-            raise ValueError(f"n_substeps must be a positive integer, got {n_substeps!r}")
-        self.advance(np.array(voltage, order="C"), int(n_substeps))
+        self.advance(np.array(voltage, order="C"), positive_integer("n_substeps", n_substeps))
 
     def advance(self, voltage: Array, n_substeps: int, then: Callable[[int, int], Any] | None = None) -> int:
         """`step` without its checks, for callers that made them: a contiguous float64 (B, n) of finite volts.
@@ -239,12 +234,7 @@ class Simulator(Readings):
     def set_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Takes a state of `get_state` from a simulator of the same size."""
         own = {"state": self._state, "summary": self._summary, "steps": self._steps}
-        for name, array in own.items():
-            if name not in state or np.shape(state[name]) != array.shape:
-                got = np.shape(state[name]) if name in state else "nothing"
-                raise ValueError(f"state[{name!r}] must have shape {array.shape}, got {got}")
-        for name, array in own.items():
-            array[...] = state[name]
+        restore(own, state)
 
     @property
     def time(self) -> Array:

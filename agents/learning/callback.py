@@ -14,6 +14,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
+from agents.learning.actor import policy_of, save_policy
 from agents.learning.checkpoint import save_checkpoint
 from agents.learning.evaluation import (
     evaluation,
@@ -25,7 +26,7 @@ from agents.learning.evaluation import (
 )
 from agents.learning.run_folder import Run
 from agents.learning.training_env import MeteredVectorEnv
-from agents.policy import Policy, load_policy, pair, policy_of
+from elbow_gym.baselines.policy import Policy, pair, read_policy
 from elbow_gym.task.settings import Settings
 
 
@@ -148,7 +149,7 @@ class Keeper(BaseCallback):
         write_evaluations(self._run.folder, self._rows)
         if self._best is None or figures["return"] > self._best.card.evaluation["return"]:
             policy.card.evaluation.update(figures, seeds=list(evaluation_seeds(self._settings)))
-            policy.save(self._run.folder / "best")
+            save_policy(policy, self._run.folder / "best")
             self._best = policy
         self._say(model.num_timesteps, figures)
         self.tick(training=False)
@@ -167,7 +168,7 @@ class Keeper(BaseCallback):
 
 def _best_so_far(folder: Path) -> Policy | None:
     try:
-        return load_policy(folder / "best") if pair(folder / "best")[0].is_file() else None
+        return read_policy(folder / "best") if pair(folder / "best")[0].is_file() else None
     except ValueError:
         # Killed between the two files of a save: what the checkpoint repeats writes them anew.
         return None

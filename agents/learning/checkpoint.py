@@ -1,7 +1,7 @@
 """Checkpoints of a training: all that it needs to go on, in one folder that appears whole or not at all.
 
 They hold pickles (Stable-Baselines3's zip and the random generators' states): load only checkpoints of your own runs.
-Policies that are shipped hold none; see `agents.policy`.
+Policies that are shipped hold none; see `elbow_gym.baselines.policy`.
 """
 
 from __future__ import annotations

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import Trajectory
 from agents.files import write_text
+from agents.learning.actor import save_policy
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.run_folder import check_run, machine, open_run, versions
-from agents.policy import Policy, PolicyCard
 from agents.workers import Job, Tell, in_processes
+from elbow_gym.baselines.policy import Policy, PolicyCard
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -193,7 +194,7 @@ def _clone_one(
         if not best or figures["return"] > best[0].card.evaluation["return"]:
             policy.card.training.update(timesteps=steps, seconds=round(spent, 1))
             policy.card.evaluation.update(figures, seeds=list(evaluation_seeds(settings)))
-            policy.save(folder / "best")
+            save_policy(policy, folder / "best")
             best[:] = [policy]
         tell(1)
         since = time.monotonic()

@@ -13,7 +13,8 @@ import tyro
 
 from agents.learning.presets import ALGORITHMS, default_settings
 from agents.learning.settings import AlgorithmSettings
-from agents.tasks import task_name, task_settings
+from agents.tasks import task_settings
+from elbow_gym.baselines.tasks import task_name
 
 
 def train_command(line: Sequence[str]) -> Callable[..., None]:

@@ -93,9 +93,9 @@ def _prepare(run: Run, model: Any, env: Any, keeper: Any) -> None:
     """What a training starts from, before its first step."""
     if run.initial_policy is not None:
         from agents.learning.warm_start import take_over
-        from agents.policy import load_policy
+        from elbow_gym.baselines.policy import read_policy
 
-        take_over(model, load_policy(run.initial_policy))
+        take_over(model, read_policy(run.initial_policy))
     if isinstance(run.settings, SACSettings) and run.settings.warm_start != "uniform":
         from agents.learning.warm_start import fill, imitate
 

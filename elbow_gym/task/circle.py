@@ -13,8 +13,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elbow_gym.checks import check_entries, finite, positive
 from elbow_gym.kernel import observe
-from elbow_gym.parameters import ArmParameters, Array, check_entries, finite, positive
+from elbow_gym.parameters import ArmParameters, Array
 from elbow_gym.task.fourier_path import (
     PLANES,
     Point,
