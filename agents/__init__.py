@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from agents.policy import load_policy
+    from agents.shipped.seeds import load_policy
 
 __all__ = ["load_policy"]
 
@@ -13,7 +13,7 @@ __all__ = ["load_policy"]
 def __getattr__(name: str) -> Any:
     # Imported when first asked for, so that `import agents` loads no compiler.
     if name == "load_policy":
-        from agents.policy import load_policy
+        from agents.shipped.seeds import load_policy
 
         return load_policy
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -54,7 +54,7 @@ def clone(words: Sequence[str]) -> Callable[..., None]:
 def publish(
     runs: Annotated[tuple[Path, ...], Positional, arg(metavar="FOLDER [FOLDER ...]")], /, replace_seeds: bool = False
 ) -> None:
-    """Takes finished runs over: best policies into agents/policies, curves into benchmarks/results/learning.
+    """Takes finished runs over into the shipped policies and learning curves; a task's best seed is its baseline.
 
     Args:
         runs: Folders of the runs, as the training named them.

@@ -43,6 +43,11 @@ def write_text(path: Path, text: str) -> Path:
     return write_whole(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
+def copy_whole(source: Path, target: Path) -> Path:
+    """Copies a file whole."""
+    return write_whole(target, lambda temporary: shutil.copyfile(source, temporary))
+
+
 def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
     """Writes a CSV file whole."""
     import csv

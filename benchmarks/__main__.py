@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from agents.cli import Commands, Count
+from agents.shipped import CURVES, OPTIMA
 from benchmarks.machine import RESULTS
 
 app = Commands("python -m benchmarks", "Benchmarks: what motion costs, how agents learn, the optimum, the speed.")
@@ -27,31 +28,35 @@ def energy(output: Path = RESULTS, episodes: Count = 20, fresh: bool = False) ->
 
 
 @app.command
-def learning(output: Path = RESULTS) -> None:
+def learning(output: Path = RESULTS, curves: Path = CURVES) -> None:
     """The learning curves against steps and seconds, and when the PD was beaten: figure, CSV and table.
 
     Args:
-        output: Folder of the results, with the curves in learning/ and energy.csv.
+        output: Folder of the results, with energy.csv.
+        curves: Folder of the learning curves.
     """
     from benchmarks.learning import save
 
-    for row in save(output):
+    for row in save(output, curves):
         print("  ".join(row))
 
 
 @app.command
-def optimal(output: Path = RESULTS, fresh: bool = False, workers: Count = 2, front: bool = True) -> None:
+def optimal(
+    output: Path = RESULTS, optima: Path = OPTIMA, fresh: bool = False, workers: Count = 2, front: bool = True
+) -> None:
     """The best possible return for each elbow count, the same under the table, and the front of energy against error.
 
     Args:
-        output: Folder for the results; problems that were solved there before are kept.
+        output: Folder for the summary.
+        optima: Folder of the solutions; problems that were solved there before are kept.
         fresh: Whether to solve everything again.
         workers: Number of processes; each solves one problem at a time.
         front: Whether to solve for the energy weights beside the default one too.
     """
     from benchmarks.optimal import optimal as solve_optimal
 
-    solve_optimal(output, fresh, workers, front)
+    solve_optimal(output, optima, fresh, workers, front)
 
 
 @app.command

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from agents.files import write_csv, write_text, write_whole
+from agents.shipped import CURVES
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES, ELBOW_NAMES, pyplot
 from agents.tasks import POLICY_NAME
 from benchmarks.machine import RESULTS
@@ -20,7 +21,6 @@ from benchmarks.optimal import Cell, cached
 
 Array = NDArray[np.float64]
 
-FOLDER = "learning"
 POINTS = 200
 TASKS = {**{f"elbows{elbows}": ELBOW_NAMES[elbows] for elbows in (2, 1, 0)}, "table": "table", "random": "drawn arms"}
 AXES = {"steps": "control periods", "training_seconds": "seconds of training, one core a seed"}
@@ -171,9 +171,12 @@ def _mark(ax: Any, task: str, papers: Mapping[tuple[str, str], Mapping[str, str]
         ax.axhline(float(best["closed_loop"]), color="black", ls=":", label="optimal bound")
 
 
-def save(results: Path = RESULTS) -> list[tuple[str, ...]]:
-    """Writes learning.png, learning.csv and learning.md from the curves in `results`/learning, if there are any."""
-    curves = load(results / FOLDER)
+def save(results: Path = RESULTS, folder: Path = CURVES) -> list[tuple[str, ...]]:
+    """Writes learning.png, learning.csv and learning.md into `results` from the curves in `folder`, if there are any.
+
+    The PD's figures are those of energy.csv and energy_table.csv in `results`.
+    """
+    curves = load(folder)
     if not curves:
         return []
     rows = table(curves, results)

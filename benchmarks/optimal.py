@@ -19,10 +19,10 @@ from agents.control.trajectory import Trajectory
 from agents.files import write_csv, write_text
 from agents.optimal.bound import Optimum, SolveError, optimum, posture_guesses
 from agents.optimal.collocation import Problem
-from benchmarks.machine import RESULTS, machine, versions
+from agents.shipped import OPTIMA
+from benchmarks.machine import machine, versions
 from elbow_gym.task.settings import Settings
 
-FOLDER = "optimal"
 DEFAULT_WEIGHT = 0.001
 FRONT_WEIGHTS = (0.0002, 0.002, 0.005)
 """Energy weights of the front beside the default one [1/W]."""
@@ -77,27 +77,27 @@ def cells(front: bool = True) -> list[Cell]:
     return bounds + [Cell(elbows, "paper", weight) for weight in FRONT_WEIGHTS for elbows in ELBOW_COUNTS if front]
 
 
-def files(cell: Cell, results: Path = RESULTS) -> tuple[Path, Path]:
+def files(cell: Cell, optima: Path = OPTIMA) -> tuple[Path, Path]:
     """A cell's figures (JSON) and its trajectory (npz)."""
-    return results / FOLDER / f"{cell.name}.json", results / FOLDER / f"{cell.name}.npz"
+    return optima / f"{cell.name}.json", optima / f"{cell.name}.npz"
 
 
-def cached(cell: Cell, results: Path = RESULTS) -> dict[str, Any] | None:
+def cached(cell: Cell, optima: Path = OPTIMA) -> dict[str, Any] | None:
     """The figures of an earlier run of the same problem, or None."""
-    card, trajectory = files(cell, results)
+    card, trajectory = files(cell, optima)
     if not (card.is_file() and trajectory.is_file()):
         return None
     plain = json.loads(card.read_text(encoding="utf-8"))
     return plain["figures"] if plain["problem"] == cell.question else None
 
 
-def solve_cell(cell: Cell, results: Path) -> str | None:
+def solve_cell(cell: Cell, optima: Path) -> str | None:
     """Solves a cell and writes its files. Returns what went wrong, or None."""
 
     def say(line: str) -> None:
         print(f"  {cell.name}: {line}", file=sys.stderr, flush=True)
 
-    parent = None if cell.parent is None else files(cell.parent, results)[1]
+    parent = None if cell.parent is None else files(cell.parent, optima)[1]
     try:
         guesses = {}
         if parent is not None and parent.is_file():
@@ -108,13 +108,13 @@ def solve_cell(cell: Cell, results: Path) -> str | None:
         found = optimum(cell.problem, guesses, say, refine=cell.energy_weight == DEFAULT_WEIGHT)
     except (SolveError, ValueError, ArithmeticError) as error:
         return str(error)
-    save(cell, found, results)
+    save(cell, found, optima)
     return None
 
 
-def save(cell: Cell, found: Optimum, results: Path) -> None:
+def save(cell: Cell, found: Optimum, optima: Path) -> None:
     """Writes a cell's two files; the card last, so that a cell counts as done only when both are there."""
-    card, trajectory = files(cell, results)
+    card, trajectory = files(cell, optima)
     found.trajectory.save(trajectory)
     plain = {
         "problem": cell.question,
@@ -127,12 +127,12 @@ def save(cell: Cell, found: Optimum, results: Path) -> None:
     write_text(card, json.dumps(plain, indent=2) + "\n")
 
 
-def write_summary(results: Path, failures: dict[str, str]) -> None:
+def write_summary(results: Path, optima: Path, failures: dict[str, str]) -> None:
     """Writes optimal.csv: one row a cell; a failed one has its reason and no numbers."""
     names = [name for name in Optimum.__dataclass_fields__ if name != "trajectory"]
     rows = []
     for cell in cells():
-        figures = cached(cell, results)
+        figures = cached(cell, optima)
         status = "solved" if figures else failures.get(cell.name, "not run")
         values = [figures[name] if figures else "" for name in names]
         values = [f"{value:.6g}" if isinstance(value, float) else value for value in values]
@@ -142,7 +142,7 @@ def write_summary(results: Path, failures: dict[str, str]) -> None:
     write_csv(results / "optimal.csv", header, rows)
 
 
-def run_cells(todo: Sequence[Cell], results: Path, workers: int) -> dict[str, str]:
+def run_cells(todo: Sequence[Cell], optima: Path, workers: int) -> dict[str, str]:
     """Solves cells in worker processes, with a bar; returns the failures' reasons by name."""
     from tqdm import tqdm
 
@@ -154,7 +154,7 @@ def run_cells(todo: Sequence[Cell], results: Path, workers: int) -> dict[str, st
     with tqdm(total=len(todo), file=sys.stderr, unit="cell") as bar, ProcessPoolExecutor(workers, context) as pool:
         # The front and what may go under the table start from the bound of their elbow count, so they wait for that.
         waiting = [cell for cell in todo if cell.parent in todo]
-        running = {pool.submit(solve_cell, cell, results): cell for cell in todo if cell not in waiting}
+        running = {pool.submit(solve_cell, cell, optima): cell for cell in todo if cell not in waiting}
         while running:
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 cell, reason = running.pop(future), future.result()
@@ -163,12 +163,19 @@ def run_cells(todo: Sequence[Cell], results: Path, workers: int) -> dict[str, st
                 bar.update()
                 bar.set_description(cell.name)
                 freed = [one for one in waiting if one.parent == cell]
-                running.update({pool.submit(solve_cell, one, results): one for one in freed})
+                running.update({pool.submit(solve_cell, one, optima): one for one in freed})
     return failures
 
 
-def optimal(output: Path, fresh: bool, workers: int, front: bool) -> None:
+def optimal(output: Path, optima: Path, fresh: bool, workers: int, front: bool) -> None:
     """Solves what is not there yet, writes optimal.csv and says what failed.
+
+    Args:
+        output: folder for optimal.csv.
+        optima: folder of the solutions.
+        fresh: solve everything again.
+        workers: processes, one problem each.
+        front: also the energy weights beside the default one.
 
     Raises:
         ValueError: CasADi is not installed.
@@ -176,9 +183,9 @@ def optimal(output: Path, fresh: bool, workers: int, front: bool) -> None:
     if find_spec("casadi") is None:
         raise ValueError('casadi must be installed to solve, got none: pip install -e ".[optimal]"')
     started = time.monotonic()
-    todo = [cell for cell in cells(front) if fresh or cached(cell, output) is None]
-    failures = run_cells(todo, output, workers)
-    write_summary(output, failures)
+    todo = [cell for cell in cells(front) if fresh or cached(cell, optima) is None]
+    failures = run_cells(todo, optima, workers)
+    write_summary(output, optima, failures)
     for name, reason in failures.items():
         print(f"failed: {name}: {reason}")
     minutes = (time.monotonic() - started) / 60.0

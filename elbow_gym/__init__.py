@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 from gymnasium.envs.registration import register  # pyright: ignore[reportUnknownVariableType]
 
 if TYPE_CHECKING:
+    from elbow_gym.baselines.pd import PDController
+    from elbow_gym.baselines.policy import load_policy
     from elbow_gym.env import ElbowArmEnv
     from elbow_gym.multi_objective import MOElbowArmEnv
     from elbow_gym.parameters import ArmParameters, LinkParameters, MotorParameters, paper_arm
@@ -27,8 +29,10 @@ _HOMES = {
     "LinkParameters": "parameters",
     "MOElbowArmEnv": "multi_objective",
     "MotorParameters": "parameters",
+    "PDController": "baselines.pd",
     "Simulator": "simulator",
     "TableParameters": "table",
+    "load_policy": "baselines.policy",
     "paper_arm": "parameters",
 }
 
@@ -40,8 +44,10 @@ __all__ = [
     "LinkParameters",
     "MOElbowArmEnv",
     "MotorParameters",
+    "PDController",
     "Simulator",
     "TableParameters",
+    "load_policy",
     "paper_arm",
 ]
 

@@ -1,6 +1,6 @@
 """The paper as printed: one arm, NumPy, one function per equation. Slow and clear on purpose.
 
-The compiled fast form in `kernel.py` is derived another way; tests prove the two equal.
+The compiled fast form in `kernel/` is derived another way; tests prove the two equal.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elbow_gym.checks import non_negative
 from elbow_gym.contact import contact_forces, contact_torque, elbow_drag
 from elbow_gym.kinematics import constraint_bias, constraint_jacobian
 from elbow_gym.motors import armature_resistance, back_emf, coulomb_friction, motor_torque
-from elbow_gym.parameters import ArmParameters, Array, non_negative
+from elbow_gym.parameters import ArmParameters, Array
 from elbow_gym.table import TableParameters
 
 __all__ = [

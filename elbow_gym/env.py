@@ -11,7 +11,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from elbow_gym.parameters import ArmParameters, Array, non_negative
+from elbow_gym.checks import as_numbers, non_negative, require_entries
+from elbow_gym.parameters import ArmParameters, Array
 from elbow_gym.rendering.viewer import RENDER_MODES, Viewer
 from elbow_gym.task.episodes import Episodes
 from elbow_gym.task.settings import Settings
@@ -27,17 +28,6 @@ def observation_space(episodes: Episodes) -> spaces.Space[NDArray[np.float32]]:
     """The observation space of one arm."""
     high = episodes.layout.high
     return cast("spaces.Space[NDArray[np.float32]]", spaces.Box(-high, high, dtype=np.float32))
-
-
-def as_action(action: object, shape: tuple[int, ...]) -> Array:
-    """The action as float64. ValueError unless it is numbers of this shape."""
-    try:
-        array = np.asarray(action, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"action must be numbers of shape {shape}, got {action!r}") from error
-    if array.shape != shape:
-        raise ValueError(f"action must have shape {shape}, got {array.shape}")
-    return array
 
 
 class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -203,7 +193,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """One control period. Raises ValueError, with the state untouched, on a wrong shape or NaN."""
         if not self._ready:
             raise gym.error.ResetNeeded("reset must be called before step")
-        array = as_action(action, (self._episodes.arm.n_joints,))
+        array = as_numbers("action", action, (self._episodes.arm.n_joints,))
         outcome = self._episodes.step(array[None])
         self._viewer.follow()
         return (
@@ -233,9 +223,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Takes a state of `get_state`; the continued run is bit-identical."""
-        for name in ("episodes", "generator"):
-            if name not in state:
-                raise ValueError(f"state must have the entry {name!r}, got {sorted(state)}")
+        require_entries(state, ("episodes", "generator"), "state")
         self._episodes.set_state(state["episodes"], [self.np_random])
         self.np_random.bit_generator.state = state["generator"]
         self._ready = True

@@ -11,36 +11,12 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from elbow_gym.checks import check_entries, finite, non_negative, positive, require_entries
+
 Array = NDArray[np.float64]
 
 MINIMUM_JOINTS = 3
 MAXIMUM_JOINTS = 64
-
-
-def finite(name: str, value: object) -> float:
-    """The value as a float; ValueError naming `name` unless it is a finite number."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise ValueError(f"{name} must be a number, got {value!r}")
-    number = float(value)
-    if not math.isfinite(number):
-        raise ValueError(f"{name} must be finite, got {value!r}")
-    return number
-
-
-def positive(name: str, value: object) -> float:
-    """The value as a float; ValueError naming `name` unless it is finite and above zero."""
-    number = finite(name, value)
-    if number <= 0.0:
-        raise ValueError(f"{name} must be positive, got {value!r}")
-    return number
-
-
-def non_negative(name: str, value: object) -> float:
-    """The value as a float; ValueError naming `name` unless it is finite and at least zero."""
-    number = finite(name, value)
-    if number < 0.0:
-        raise ValueError(f"{name} must not be negative, got {value!r}")
-    return number
 
 
 def _set(instance: object, name: str, value: object) -> None:
@@ -205,9 +181,7 @@ class ArmParameters:
         """The arm of `to_dict`. Raises ValueError naming an unknown, missing or wrong entry."""
         allowed = {field.name for field in fields(cls)}
         check_entries(plain, allowed, "arm")
-        missing = sorted(allowed - {"gravity"} - set(plain))
-        if missing:
-            raise ValueError(f"arm must have the entry {missing[0]!r}, got {sorted(plain)}")
+        require_entries(plain, sorted(allowed - {"gravity"}), "arm")
         values = dict(plain)
         values["links"] = tuple(_part(LinkParameters, part, "links") for part in _sequence("links", plain["links"]))
         values["motors"] = tuple(
@@ -222,13 +196,6 @@ def _sequence(name: str, value: object) -> Sequence[Any]:
     if not isinstance(value, list | tuple):
         raise ValueError(f"{name} must be a list, got {value!r}")
     return cast("Sequence[Any]", value)
-
-
-def check_entries(plain: Mapping[str, Any], allowed: set[str], owner: str) -> None:
-    """ValueError naming `owner` and the first entry of `plain` that is not in `allowed`."""
-    unknown = sorted(set(plain) - allowed)
-    if unknown:
-        raise ValueError(f"{owner} must have only the entries {sorted(allowed)}, got {unknown[0]!r}")
 
 
 def _part(kind: type[Any], plain: object, owner: str) -> Any:

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-import numbers
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from elbow_gym import kernel
+from elbow_gym.checks import as_batch, positive, positive_integer, restore
+from elbow_gym.kernel.build import kernel
+from elbow_gym.kernel.rows import (
+    LARGEST_ANGLE,
+    MAXIMUM_ELBOWS,
+    STATE_ROWS,
+    SUMMARY_COLUMNS,
+    SWITCHED_STATE,
+    SWITCHED_STATE_ROWS,
+    VALID,
+)
+from elbow_gym.kernel.slots import BLOCK_LANES
 from elbow_gym.kinematics import elbow_heights, pitches
-from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows, positive
+from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
 from elbow_gym.simulation.options import Conditions
-from elbow_gym.simulation.parameter_rows import as_batch, parameter_table
+from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.simulation.state_views import Readings
 from elbow_gym.simulation.thread_pool import Sharing
 
@@ -48,12 +58,10 @@ class Simulator(Readings):
     ) -> None:
         self.arm = as_arm(arm)
         self.elbows = as_elbows(elbows, self.arm.n_joints)
-        if len(self.elbows) > kernel.MAXIMUM_ELBOWS:
-            raise ValueError(f"elbows must be at most {kernel.MAXIMUM_ELBOWS}, got {len(self.elbows)}")
-        for name, count in (("num_envs", num_envs), ("num_threads", num_threads)):
-            if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 1:
-                raise ValueError(f"{name} must be a positive integer, got {count!r}")
-        self.num_envs = int(num_envs)
+        if len(self.elbows) > MAXIMUM_ELBOWS:
+            raise ValueError(f"elbows must be at most {MAXIMUM_ELBOWS}, got {len(self.elbows)}")
+        self.num_envs = positive_integer("num_envs", num_envs)
+        self._num_threads = positive_integer("num_threads", num_threads)
         self.conditions = Conditions(**conditions)
         self.timestep = positive("timestep", timestep)
         limit, reason = self.conditions.longest_timestep(self.arm)
@@ -66,12 +74,11 @@ class Simulator(Readings):
         }
         n = self.arm.n_joints
         self._elbow_index = np.array(self.elbows, dtype=np.int64)
-        rows = kernel.SWITCHED_STATE_ROWS if any(self._switches.values()) else kernel.STATE_ROWS
+        rows = SWITCHED_STATE_ROWS if any(self._switches.values()) else STATE_ROWS
         self._state = np.zeros((self.num_envs, rows, n))
-        self._summary = np.zeros((self.num_envs, kernel.SUMMARY_COLUMNS + len(self.elbows)))
+        self._summary = np.zeros((self.num_envs, SUMMARY_COLUMNS + len(self.elbows)))
         self._parameters = np.repeat(parameter_table(self.arm, self.conditions)[None], self.num_envs, axis=0)
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
-        self._num_threads = int(num_threads)
         self._attach()
         self._nominal = as_batch("nominal_pose", self.arm.nominal_pose, (self.num_envs, n))
         if self.elbows and np.abs(elbow_heights(self.arm, self.arm.nominal_pose, self.elbows)).max() > PLANE_TOLERANCE:
@@ -80,13 +87,17 @@ class Simulator(Readings):
 
     def _attach(self) -> None:
         # Up to two arms the lanes of a block would mostly idle.
-        lanes = 1 if self.num_envs <= 2 else kernel.BLOCK_LANES
-        self._advance, _, self._settle = kernel.kernel(lanes, **self._switches)
+        lanes = 1 if self.num_envs <= 2 else BLOCK_LANES
+        self._advance, _, self._project_poses = kernel(lanes, **self._switches)
         self._sharing = Sharing(self.num_envs, lanes, self._num_threads)
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the compiled functions and the threads, for pickling and copying."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("_advance", "_settle", "_sharing")}
+        return {
+            name: value
+            for name, value in self.__dict__.items()
+            if name not in ("_advance", "_project_poses", "_sharing")
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -113,16 +124,16 @@ class Simulator(Readings):
         q, q_dot, current, rise, chosen = self.check_state(q, q_dot, current, mask, temperature_rise)
         self._state[chosen] = 0.0
         if self.conditions.heat:
-            self._state[chosen, kernel.STATE_ROWS + kernel.SWITCHED_STATE.index("temperature_rise")] = rise[chosen]
+            self._state[chosen, STATE_ROWS + SWITCHED_STATE.index("temperature_rise")] = rise[chosen]
         self._state[chosen, 0] = q[chosen]
         self._state[chosen, 1] = q_dot[chosen]
         self._state[chosen, 2] = current[chosen]
-        valid = self._summary[:, kernel.VALID].copy()
+        valid = self._summary[:, VALID].copy()
         self._summary[chosen] = 0.0
         self._steps[chosen] = 0
         self._run(np.zeros(q.shape), 0)
         # Looking at the other arms' last state again does not make it the outcome of their last step.
-        self._summary[~chosen, kernel.VALID] = valid[~chosen]
+        self._summary[~chosen, VALID] = valid[~chosen]
 
     def parameters(self, chosen: NDArray[np.int64]) -> Array:
         """A copy of the kernel's parameter rows of some arms, (k, PARAMETER_ROWS, n)."""
@@ -139,8 +150,8 @@ class Simulator(Readings):
         """
         settled = as_batch("q", q, (self.num_envs, self.arm.n_joints)).copy()
         if self.elbows:
-            self._settle(settled, self._parameters, self._elbow_index)
-            if not (np.abs(settled).max() < kernel.LARGEST_ANGLE):
+            self._project_poses(settled, self._parameters, self._elbow_index)
+            if not (np.abs(settled).max() < LARGEST_ANGLE):
                 raise ValueError(f"q must be near a pose with the elbows {self.elbows} at z = 0, got {q!r}")
             self._check_on_table(settled, np.zeros_like(settled), self._parameters[:, 0])
         return settled
@@ -165,8 +176,8 @@ class Simulator(Readings):
         chosen = np.ones(self.num_envs, dtype=np.bool_) if mask is None else np.asarray(mask, dtype=np.bool_)
         if chosen.shape != (self.num_envs,):
             raise ValueError(f"mask must have shape {(self.num_envs,)}, got {chosen.shape}")
-        if np.abs(q).max() >= kernel.LARGEST_ANGLE:
-            raise ValueError(f"q must be within {kernel.LARGEST_ANGLE:g} rad, got {np.abs(q).max():g}")
+        if np.abs(q).max() >= LARGEST_ANGLE:
+            raise ValueError(f"q must be within {LARGEST_ANGLE:g} rad, got {np.abs(q).max():g}")
         if self.elbows:
             self._check_on_table(q[chosen], q_dot[chosen], self._parameters[chosen, 0])
         return q, q_dot, current, rise, chosen
@@ -190,9 +201,7 @@ class Simulator(Readings):
         Raises ValueError, with the state untouched, on a wrong shape, a non-finite voltage or n_substeps < 1.
         """
         voltage = as_batch("voltage", voltage, (self.num_envs, self.arm.n_joints))
-        if isinstance(n_substeps, bool) or not isinstance(n_substeps, numbers.Integral) or n_substeps < 1:
-            raise ValueError(f"n_substeps must be a positive integer, got {n_substeps!r}")
-        self.advance(np.array(voltage, order="C"), int(n_substeps))
+        self.advance(np.array(voltage, order="C"), positive_integer("n_substeps", n_substeps))
 
     def advance(self, voltage: Array, n_substeps: int, then: Callable[[int, int], Any] | None = None) -> int:
         """`step` without its checks, for callers that made them: a contiguous float64 (B, n) of finite volts.
@@ -225,12 +234,7 @@ class Simulator(Readings):
     def set_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Takes a state of `get_state` from a simulator of the same size."""
         own = {"state": self._state, "summary": self._summary, "steps": self._steps}
-        for name, array in own.items():
-            if name not in state or np.shape(state[name]) != array.shape:
-                got = np.shape(state[name]) if name in state else "nothing"
-                raise ValueError(f"state[{name!r}] must have shape {array.shape}, got {got}")
-        for name, array in own.items():
-            array[...] = state[name]
+        restore(own, state)
 
     @property
     def time(self) -> Array:

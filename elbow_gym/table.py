@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, cast
 
-from elbow_gym.parameters import check_entries, non_negative, positive
+from elbow_gym.checks import check_entries, non_negative, positive
 
 FRICTION_VELOCITY = 0.01
 """Sliding speed [m/s] over which friction on the table comes up, unless a table says otherwise."""

@@ -12,8 +12,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from elbow_gym.env import ElbowArmEnv, action_space, as_action, observation_space
-from elbow_gym.parameters import ArmParameters, Array, non_negative
+from elbow_gym.checks import as_numbers, non_negative, require_entries
+from elbow_gym.env import ElbowArmEnv, action_space, observation_space
+from elbow_gym.parameters import ArmParameters, Array
 from elbow_gym.rendering.viewer import Viewer
 from elbow_gym.task.episodes import Episodes
 from elbow_gym.task.settings import Settings
@@ -167,7 +168,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             raise gym.error.ResetNeeded(
                 f"reset must be called before step, got arms {np.flatnonzero(~self._started)} never reset"
             )
-        array = as_action(actions, (self.num_envs, self._episodes.arm.n_joints))
+        array = as_numbers("action", actions, (self.num_envs, self._episodes.arm.n_joints))
         waiting = self._over
         some_wait = bool(waiting.any())
         if some_wait and self.autoreset_mode is AutoresetMode.DISABLED:
@@ -237,9 +238,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Takes a state of `get_state`; the continued run is bit-identical."""
-        for name in ("episodes", "generators", "over", "started"):
-            if name not in state:
-                raise ValueError(f"state must have the entry {name!r}, got {sorted(state)}")
+        require_entries(state, ("episodes", "generators", "over", "started"), "state")
         if len(state["generators"]) != self.num_envs:
             raise ValueError(f"state['generators'] must have {self.num_envs} entries, got {len(state['generators'])}")
         self._episodes.set_state(state["episodes"], self.np_random)

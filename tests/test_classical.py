@@ -6,12 +6,12 @@ from threadpoolctl import threadpool_limits
 
 from agents.control.classical import COMPUTED, ComputedTorque, GravityPD, Reference, economical_pose
 from agents.control.minimum_jerk import minimum_jerk
-from agents.control.pd import CLIPPED
 from agents.control.posture import best_postures, static_copper_loss
 from agents.evaluation.metrics import metrics
 from agents.evaluation.players import CLASSICAL
 from agents.optimal.bound import rollout
 from elbow_gym import Simulator
+from elbow_gym.baselines.pd import CLIPPED
 from elbow_gym.kinematics import hand_position, inverse_kinematics, joint_positions
 from elbow_gym.task.circle import Circle
 from elbow_gym.task.settings import Settings

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from agents.control.lqr import TimeVaryingLQR
-from agents.control.trajectory import OPTIMA, Trajectory
+from agents.control.trajectory import Trajectory
 from agents.learning.clone import clone, clone_all
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.evaluation import evaluation
 from agents.learning.publish import publish
-from agents.policy import load_policy
+from agents.shipped import OPTIMA
+from elbow_gym.baselines.policy import read_policy
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -55,8 +56,9 @@ def test_run_of_a_clone_can_be_published_and_loaded(tmp_path, beginning):
     result = clone_all(SETTINGS, tmp_path / "beginning.npz", SMALL, [5], [folder], "command")[5]
     assert result["finished"]
     assert json.loads((folder / "result.json").read_text()) == result
-    assert publish([folder], tmp_path / "policies", tmp_path / "curves") == ["clone_elbows2_seed5"]
-    policy = load_policy(tmp_path / "policies" / "clone_elbows2_seed5")
+    places = {name: tmp_path / name for name in ("baselines", "policies", "curves")}
+    assert publish([folder], **places) == ["clone_elbows2_seed5"]
+    policy = read_policy(tmp_path / "baselines" / "clone_elbows2_seed5")
     assert evaluation(policy, SETTINGS)["return"] == pytest.approx(result["best"]["return"])
     with pytest.raises(ValueError, match="output must be free of earlier runs"):
         clone_all(SETTINGS, tmp_path / "beginning.npz", SMALL, [5], [folder], "command")

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.control.pd import CLIPPED, PDController
 from agents.evaluation.metrics import REGIMES, UNITS
 from agents.evaluation.players import SHIFTED
 from agents.evaluation.recording import record
@@ -19,6 +18,7 @@ from benchmarks.energy.cells import Cell
 from benchmarks.energy.statistics import interquartile_mean
 from benchmarks.machine import RESULTS
 from benchmarks.optimal import FRONT_WEIGHTS
+from elbow_gym.baselines.pd import CLIPPED, PDController
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -61,6 +61,7 @@ def measured(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(energy, "cells", lambda: QUICK)
         patch.setattr(energy, "sweep", list)
+        patch.setattr(energy.learning, "save", lambda folder: None)
         rows = energy.energy(folder, episodes=2, folder=folder / "cache", parallel=False)
     return folder, rows
 

@@ -10,8 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba import njit
 
-from elbow_gym import kernel, kinematics, paper_arm
+from elbow_gym import kinematics, paper_arm
+from elbow_gym.kernel.build import kernel
+from elbow_gym.kernel.rows import BELOW_TABLE, PARAMETER_ROWS, STATE_ROWS, SUMMARY_COLUMNS
+from elbow_gym.kernel.sine import sincos
+from elbow_gym.kernel.slots import BLOCK_LANES
+from elbow_gym.kernel.template import compiled
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 
@@ -22,7 +28,7 @@ ELBOWS = (4, 7)
 
 def states(q, q_dot, current):
     """Kernel state rows (B, STATE_ROWS, n) with empty meters."""
-    state = np.zeros((len(q), kernel.STATE_ROWS, q.shape[1]))
+    state = np.zeros((len(q), STATE_ROWS, q.shape[1]))
     state[:, 0], state[:, 1], state[:, 2] = q, q_dot, current
     return state
 
@@ -31,14 +37,14 @@ def accelerations(lanes, state, parameters, voltage, elbows, **switches):
     """The kernel's q_ddot, elbow forces and current rates of a batch."""
     q_ddot, current_dot, force = np.zeros_like(voltage), np.zeros_like(voltage), np.zeros((len(voltage), len(elbows)))
     joints = np.array(elbows, dtype=np.int64)
-    kernel.kernel(lanes, **switches).accelerations(state, parameters, voltage, joints, q_ddot, current_dot, force)
+    kernel(lanes, **switches).accelerations(state, parameters, voltage, joints, q_ddot, current_dot, force)
     return q_ddot, force, current_dot
 
 
 def batch(size):
     """Arms that differ in state, voltage and every parameter, near the start pose."""
     rng = np.random.default_rng(5)
-    scatter = rng.uniform(0.7, 1.4, (40, kernel.PARAMETER_ROWS, 10))
+    scatter = rng.uniform(0.7, 1.4, (40, PARAMETER_ROWS, 10))
     parameters = parameter_table(paper_arm(), Conditions(payload=0.2)) * scatter
     state = states(paper_arm().nominal_pose + 0.3 * rng.normal(size=(40, 10)), *rng.normal(size=(2, 40, 10)))
     return state[:size].copy(), parameters[:size].copy(), rng.uniform(-24.0, 24.0, (40, 10))[:size].copy()
@@ -47,29 +53,29 @@ def batch(size):
 def advanced(lanes, size, n_steps=20, elbows=ELBOWS):
     """State and summary of a batch after some steps of 1 ms."""
     state, parameters, voltage = batch(size)
-    summary = np.zeros((size, kernel.SUMMARY_COLUMNS + len(elbows)))
+    summary = np.zeros((size, SUMMARY_COLUMNS + len(elbows)))
     joints = np.array(elbows, dtype=np.int64)
-    kernel.kernel(lanes).advance(state, parameters, voltage, joints, 0, size, n_steps, 0.001, summary)
+    kernel(lanes).advance(state, parameters, voltage, joints, 0, size, n_steps, 0.001, summary)
     return np.concatenate([state.reshape(size, -1), summary], axis=1)
 
 
 @given(st.floats(-9.9e4, 9.9e4))
 def test_sine_and_cosine_are_the_librarys_to_the_last_bit_or_two(angle):
-    assert kernel.sincos(angle) == pytest.approx((math.sin(angle), math.cos(angle)), rel=0.0, abs=2.3e-16)
+    assert sincos(angle) == pytest.approx((math.sin(angle), math.cos(angle)), rel=0.0, abs=2.3e-16)
 
 
 def test_sine_and_cosine_hold_in_every_quadrant_and_at_its_edges():
     edges = np.arange(-60000, 60000, 7) * (np.pi / 4.0)
     for angle in np.concatenate([edges, np.nextafter(edges, np.inf), np.linspace(-10.0, 10.0, 4001)]):
-        assert kernel.sincos(angle) == pytest.approx((math.sin(angle), math.cos(angle)), rel=0.0, abs=2.3e-16)
+        assert sincos(angle) == pytest.approx((math.sin(angle), math.cos(angle)), rel=0.0, abs=2.3e-16)
 
 
 def test_sine_keeps_its_digits_near_its_zeros():
     for angle in np.arange(1.0, 30000.0, 7.0) * np.pi:
-        assert kernel.sincos(angle)[0] == pytest.approx(math.sin(angle), rel=1e-12, abs=0.0)
+        assert sincos(angle)[0] == pytest.approx(math.sin(angle), rel=1e-12, abs=0.0)
 
 
-@pytest.mark.parametrize("lanes", [1, kernel.BLOCK_LANES])
+@pytest.mark.parametrize("lanes", [1, BLOCK_LANES])
 @pytest.mark.parametrize("elbows", [0, 1, 2])
 def test_accelerations_and_elbow_forces_are_pinocchios(arm, lanes, elbows):
     state = states(VECTORS["q"], VECTORS["qd"], VECTORS["i"])
@@ -106,8 +112,8 @@ def test_an_uncompiled_kernel_of_odd_width_gives_the_same_bits():
 
 def test_only_the_arms_asked_for_move():
     state, parameters, voltage = batch(40)
-    before, summary = state.copy(), np.zeros((40, kernel.SUMMARY_COLUMNS))
-    kernel.kernel(16).advance(state, parameters, voltage, np.zeros(0, np.int64), 5, 23, 3, 0.001, summary)
+    before, summary = state.copy(), np.zeros((40, SUMMARY_COLUMNS))
+    kernel(16).advance(state, parameters, voltage, np.zeros(0, np.int64), 5, 23, 3, 0.001, summary)
     moved = (state != before).any(axis=(1, 2))
     np.testing.assert_array_equal(np.flatnonzero(moved), np.arange(5, 23))
     np.testing.assert_array_equal(np.flatnonzero(summary.any(axis=1)), np.arange(5, 23))
@@ -118,9 +124,9 @@ def test_only_the_arms_asked_for_move():
 def test_an_arm_that_blows_up_keeps_its_state_and_spares_its_neighbours(lanes, volts):
     state, parameters, voltage = batch(7)
     voltage[3] = volts
-    before, summary = state.copy(), np.full((7, kernel.SUMMARY_COLUMNS + 2), 7.0)
-    summary[:, kernel.BELOW_TABLE] = 0.0
-    invalid = kernel.kernel(lanes).advance(state, parameters, voltage, np.array(ELBOWS), 0, 7, 20, 0.001, summary)
+    before, summary = state.copy(), np.full((7, SUMMARY_COLUMNS + 2), 7.0)
+    summary[:, BELOW_TABLE] = 0.0
+    invalid = kernel(lanes).advance(state, parameters, voltage, np.array(ELBOWS), 0, 7, 20, 0.001, summary)
     assert invalid == 1
     np.testing.assert_array_equal(state[3], before[3])
     np.testing.assert_array_equal(summary[3], [7.0, 7.0, 7.0, 7.0, 0.0, 0.0, 7.0, 7.0])
@@ -138,7 +144,7 @@ def test_elbows_that_cannot_move_leave_the_rest_finite(arm):
 
 def test_settling_a_horizontal_link_is_a_turn_of_its_joint(arm):
     q = np.array([[0.3, 1.2, 0.5, *np.zeros(7)]])
-    kernel.kernel(1).settle(q, parameter_table(arm)[None], np.array([3]))
+    kernel(1).project_poses(q, parameter_table(arm)[None], np.array([3]))
     # Joint 3 comes down as link 2 turns to 90 degrees; link 3 keeps its absolute pitch.
     np.testing.assert_allclose(q[0, :4], [0.3, np.pi / 2.0, 1.7 - np.pi / 2.0, 0.0], atol=1e-15)
 
@@ -147,7 +153,7 @@ def test_settling_a_horizontal_link_is_a_turn_of_its_joint(arm):
 def test_settling_lays_elbows_on_the_plane_by_the_least_change_of_pitch(arm, lanes):
     start = arm.nominal_pose + 1e-5 * np.random.default_rng(2).normal(size=(5, 10))
     q = start.copy()
-    kernel.kernel(lanes).settle(q, np.repeat(parameter_table(arm)[None], 5, axis=0), np.array(ELBOWS))
+    kernel(lanes).project_poses(q, np.repeat(parameter_table(arm)[None], 5, axis=0), np.array(ELBOWS))
     assert np.abs(kinematics.elbow_heights(arm, q, ELBOWS)).max() < 1e-15
     # A least change has no part along the plane: it is a sum of the two heights' gradients in the absolute pitches.
     shift = (kinematics.pitches(q) - kinematics.pitches(start))[:, 1:]
@@ -162,8 +168,8 @@ def test_what_no_folder_can_cache_is_compiled_all_the_same():
     space = {}
     exec("def double(x):\n    return 2.0 * x", space)
     with pytest.raises(RuntimeError, match="cannot cache"):
-        kernel.njit(cache=True)(space["double"])
-    assert kernel._compiled(space["double"], cached=True)(3.0) == 6.0
+        njit(cache=True)(space["double"])
+    assert compiled(space["double"], cached=True)(3.0) == 6.0
 
 
 def test_where_all_folders_are_read_only_the_kernels_functions_compile_all_the_same(monkeypatch):
@@ -172,6 +178,6 @@ def test_where_all_folders_are_read_only_the_kernels_functions_compile_all_the_s
 
     monkeypatch.setattr("numba.core.caching.tempfile.TemporaryFile", refuse)
     with pytest.raises(RuntimeError, match="cannot cache"):
-        kernel.njit(cache=True)(kernel.sincos)
-    sine, cosine = kernel._compiled(kernel.sincos, cached=True)(0.5)
+        njit(cache=True)(sincos)
+    sine, cosine = compiled(sincos, cached=True)(0.5)
     assert (sine, cosine) == pytest.approx((math.sin(0.5), math.cos(0.5)), rel=1e-15)

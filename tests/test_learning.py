@@ -48,16 +48,16 @@ def test_figure_and_table_come_from_the_files(tmp_path):
         row = dict.fromkeys(COLUMNS, 1.0) | {"electrical_energy": energy, "return": -30.0 - seed}
         rows = [[row[name] if name != "steps" else steps for name in COLUMNS] for steps in (0.0, 100.0)]
         RunFolder(results / "run").write_evaluations(rows)
-        (results / "learning").mkdir(exist_ok=True)
-        (results / "run/evaluations.csv").rename(results / f"learning/ppo_elbows2_seed{seed}.csv")
-    assert learning.save(results) == [("ppo", "elbows2", "2", "1", "0", "1", "1", "-30.5")]
+        (results / "curves").mkdir(exist_ok=True)
+        (results / "run/evaluations.csv").rename(results / f"curves/ppo_elbows2_seed{seed}.csv")
+    assert learning.save(results, results / "curves") == [("ppo", "elbows2", "2", "1", "0", "1", "1", "-30.5")]
     assert (results / "learning.png").stat().st_size > 10_000
     assert "PPO, 24 V" in (results / "learning.md").read_text()
-    (results / "learning/what_seed0.csv").write_text("steps [-]\n0\n")
+    (results / "curves/what_seed0.csv").write_text("steps [-]\n0\n")
     with pytest.raises(ValueError, match=r"curves must be named ALGORITHM_TASK_seedK.csv, got what_seed0.csv"):
-        learning.save(results)
+        learning.save(results, results / "curves")
 
 
 def test_no_curves_make_no_figure(tmp_path):
-    assert learning.save(tmp_path) == []
+    assert learning.save(tmp_path, tmp_path) == []
     assert not list(tmp_path.iterdir())

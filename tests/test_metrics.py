@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from agents.control.pd import PDController
 from agents.evaluation.metrics import REGIMES, UNITS, joint_energies, metrics
 from agents.evaluation.recording import Recording, record
+from elbow_gym.baselines.pd import PDController
 from elbow_gym.task.settings import Settings
 
 

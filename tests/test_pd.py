@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from agents.control.pd import PDController
+from elbow_gym.baselines.pd import PDController
 from elbow_gym.kinematics import hand_position
 from elbow_gym.vector_env import ElbowArmVectorEnv
 

@@ -8,10 +8,15 @@ import pytest
 import torch
 from stable_baselines3 import PPO
 
-import agents.policy as policies
+import agents.pd
+import elbow_gym
+from agents.learning.actor import policy_of, save_policy
 from agents.learning.sac.settings import SACSettings
-from agents.policy import Policy, load_policy, policy_of, shipped_policies
-from agents.tasks import task_name
+from agents.shipped import seeds as shipped
+from agents.shipped.seeds import load_policy, shipped_policies
+from elbow_gym.baselines import policy as baselines
+from elbow_gym.baselines.policy import Policy, pair, read_policy
+from elbow_gym.baselines.tasks import task_name
 from elbow_gym.env import ElbowArmEnv
 from elbow_gym.sb3 import SB3VecEnv
 from elbow_gym.task.settings import Settings
@@ -75,7 +80,7 @@ def test_weights_of_another_card_are_refused(policy):
 
 
 def test_saved_policy_comes_back_bit_for_bit(policy, tmp_path):
-    policy.save(tmp_path / "p")
+    save_policy(policy, tmp_path / "p")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["p.json", "p.safetensors"]
     back = load_policy(tmp_path / "p")
     assert back.card == policy.card
@@ -84,11 +89,11 @@ def test_saved_policy_comes_back_bit_for_bit(policy, tmp_path):
 
 
 def test_interrupted_save_leaves_the_old_policy(policy, tmp_path, monkeypatch):
-    policy.save(tmp_path / "p")
+    save_policy(policy, tmp_path / "p")
     before = (tmp_path / "p.safetensors").read_bytes()
     monkeypatch.setattr("safetensors.numpy.save_file", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
     with pytest.raises(OSError, match="disk full"):
-        policy.save(tmp_path / "p")
+        save_policy(policy, tmp_path / "p")
     assert (tmp_path / "p.safetensors").read_bytes() == before
     assert len(list(tmp_path.iterdir())) == 2
 
@@ -128,7 +133,7 @@ def test_bundle_that_does_not_fit_is_refused(policy, tmp_path):
         Policy(replace(policy.card, format=7), policy.weights)
     with pytest.raises(ValueError, match=r"policy must be one of .*got no"):
         load_policy(tmp_path / "nothing")
-    policy.save(tmp_path / "p")
+    save_policy(policy, tmp_path / "p")
     (tmp_path / "p.json").write_text(json.dumps({"algorithm": "ppo"}))
     with pytest.raises(ValueError, match="policy card must hold the fields of PolicyCard"):
         load_policy(tmp_path / "p")
@@ -136,32 +141,60 @@ def test_bundle_that_does_not_fit_is_refused(policy, tmp_path):
 
 def test_every_shipped_policy_loads_fits_and_is_small():
     assert "ppo_elbows2_seed0" in shipped_policies()
-    files = list(policies.SHIPPED.iterdir())
+    files = [path for folder in (baselines.BASELINES, shipped.POLICIES) for path in folder.iterdir()]
     assert sum(path.stat().st_size for path in files) <= 12_000_000
     assert {path.suffix for path in files} == {".json", ".safetensors"}
-    for name in shipped_policies():
-        policy = load_policy(policies.SHIPPED / name)
+    for path in (path.with_suffix("") for path in files if path.suffix == ".json"):
+        policy = read_policy(path)
         policy.check(ElbowArmEnv(**policy.card.environment))
-        assert sum(path.stat().st_size for path in policies.pair(policies.SHIPPED / name)) < 300_000
+        assert sum(part.stat().st_size for part in pair(path)) < 300_000
         assert policy.card.command.startswith(("python -m agents train", "python -m agents clone"))
         task = task_name(policy.card.env, policy.card.environment["elbows"])
-        assert name.startswith(policy.card.algorithm)
-        assert name.endswith(f"{task}_seed{policy.card.training['seed']}")
+        assert path.name.startswith(policy.card.algorithm)
+        assert path.name.endswith(f"{task}_seed{policy.card.training['seed']}")
 
 
-def test_best_seed_is_loaded_unless_one_is_given(policy, tmp_path, monkeypatch):
-    monkeypatch.setattr(policies, "SHIPPED", tmp_path)
-    for seed, merit in ((0, -40.0), (3, -30.0), (10, -35.0)):
-        Policy(replace(policy.card, evaluation={"return": merit}), policy.weights).save(
-            tmp_path / f"ppo_table_seed{seed}"
+def test_baseline_is_the_best_seed_and_no_policy_is_stored_twice():
+    names = shipped_policies()
+    assert len(set(names)) == len(names)
+    groups = {name.rpartition("_seed")[0] for name in names}
+    assert baselines.baseline_names() == sorted(groups)
+    for group in groups:
+        merits = [
+            read_policy(shipped.shipped_path(group, k)).card.evaluation["return"] for k in shipped.shipped_seeds(group)
+        ]
+        assert read_policy(baselines.baseline_path(group)).card.evaluation["return"] == max(merits)
+
+
+def test_package_and_agents_load_the_same_baseline():
+    for arguments in ({"elbows": 2}, {"env": "ElbowArmTable-v0"}):
+        assert elbow_gym.load_policy("ppo", **arguments).card == load_policy("ppo", **arguments).card
+    assert elbow_gym.load_policy("ppo", elbows=2).card.training["seed"] == 2
+    assert agents.load_policy is load_policy
+    assert agents.pd.PDController is elbow_gym.PDController
+
+
+def test_baseline_is_loaded_unless_a_seed_is_given(policy, tmp_path, monkeypatch):
+    best, others = tmp_path / "best", tmp_path / "others"
+    for module, name, folder in (
+        (baselines, "BASELINES", best),
+        (shipped, "BASELINES", best),
+        (shipped, "POLICIES", others),
+    ):
+        monkeypatch.setattr(module, name, folder)
+    for seed, merit, folder in ((0, -40.0, others), (3, -30.0, best), (10, -35.0, others)):
+        save_policy(
+            Policy(replace(policy.card, evaluation={"return": merit}), policy.weights), folder / f"ppo_table_seed{seed}"
         )
-    assert policies.shipped_seeds("ppo_table") == [0, 3, 10]
+    assert shipped.shipped_seeds("ppo_table") == [0, 3, 10]
     assert load_policy("ppo", env="ElbowArmTable-v0").card.evaluation["return"] == -30.0
-    assert load_policy("ppo", env="ElbowArmTable-v0", seed=10).card.evaluation["return"] == -35.0
+    for seed, merit in ((3, -30.0), (10, -35.0)):
+        assert load_policy("ppo", env="ElbowArmTable-v0", seed=seed).card.evaluation["return"] == merit
     with pytest.raises(ValueError, match=r"seed of ppo_table must be one of \[0, 3, 10\], got 1"):
         load_policy("ppo", env="ElbowArmTable-v0", seed=1)
-    with pytest.raises(ValueError, match=r"policy must be one of \['ppo_table'\], got 'sac_elbows1'"):
-        load_policy("sac", elbows=1)
+    for seed in (None, 0):
+        with pytest.raises(ValueError, match=r"policy must be one of \['ppo_table'\], got 'sac_elbows1'"):
+            load_policy("sac", elbows=1, seed=seed)
     with pytest.raises(ValueError, match=r"env must be one of .*, got 'Pendulum-v1'"):
         load_policy("ppo", env="Pendulum-v1")
 

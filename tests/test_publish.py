@@ -6,14 +6,15 @@ import shutil
 import pytest
 
 from agents.learning.publish import publish
-from agents.policy import SHIPPED, load_policy, pair
+from agents.shipped.seeds import shipped_path
+from elbow_gym.baselines.policy import pair, read_policy
 
 
 @pytest.fixture
 def run(tmp_path):
     folder = tmp_path / "runs" / "ppo_elbows2_seed0"
     folder.mkdir(parents=True)
-    for source, target in zip(pair(SHIPPED / "ppo_elbows2_seed0"), pair(folder / "best"), strict=True):
+    for source, target in zip(pair(shipped_path("ppo_elbows2", 0)), pair(folder / "best"), strict=True):
         shutil.copyfile(source, target)
     (folder / "result.json").write_text(json.dumps({"finished": True}))
     (folder / "evaluations.csv").write_text("steps [-]\n0\n")
@@ -21,13 +22,13 @@ def run(tmp_path):
 
 
 def places(tmp_path):
-    return {"policies": tmp_path / "policies", "curves": tmp_path / "curves"}
+    return {name: tmp_path / name for name in ("baselines", "policies", "curves")}
 
 
 def test_finished_run_is_copied_whole(run, tmp_path):
     assert publish([run], **places(tmp_path)) == ["ppo_elbows2_seed0"]
-    copied = load_policy(tmp_path / "policies/ppo_elbows2_seed0")
-    assert copied.card == load_policy(run / "best").card
+    copied = read_policy(tmp_path / "baselines/ppo_elbows2_seed0")
+    assert copied.card == read_policy(run / "best").card
     assert (tmp_path / "curves/ppo_elbows2_seed0.csv").read_text() == (run / "evaluations.csv").read_text()
 
 
@@ -57,9 +58,32 @@ def test_old_seeds_go_when_asked(run, tmp_path):
     publish([run], **old)
     for name in ("ppo_elbows2_seed7", "ppo_elbows1_seed7"):
         for path in pair(old["policies"] / name):
-            path.write_text("old")
+            path.write_text('{"evaluation": {"return": -99.0}}')
     publish([run], **old)
     assert (old["policies"] / "ppo_elbows2_seed7.json").exists()
     publish([run], **old, replace_seeds=True)
     assert not list(old["policies"].glob("ppo_elbows2_seed7*"))
     assert (old["policies"] / "ppo_elbows1_seed7.json").exists()
+
+
+def test_best_seed_becomes_the_baseline_and_the_others_stand_beside_the_curves(run, tmp_path):
+    card = json.loads((run / "best.json").read_text())
+    runs = []
+    for seed, merit in ((3, -30.0), (11, -20.0), (5, -40.0)):
+        card["training"]["seed"], card["evaluation"]["return"] = seed, merit
+        (run / "best.json").write_text(json.dumps(card))
+        runs.append(shutil.copytree(run, run.with_name(f"ppo_elbows2_seed{seed}")))
+
+    def published():
+        folders = places(tmp_path).values()
+        return [sorted(int(path.stem.partition("_seed")[2]) for path in f.glob("*.[jc]s*")) for f in folders]
+
+    publish([runs[0], runs[2]], **places(tmp_path))
+    assert published() == [[3], [5], [3, 5]]
+    publish([runs[1]], **places(tmp_path))
+    assert published() == [[11], [3, 5], [3, 5, 11]]
+    publish([runs[1]], **places(tmp_path))
+    assert published() == [[11], [3, 5], [3, 5, 11]]
+    publish([runs[2]], **places(tmp_path), replace_seeds=True)
+    assert published() == [[5], [], [5]]
+    assert len(list((tmp_path / "baselines").iterdir())) == 2

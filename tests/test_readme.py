@@ -39,7 +39,7 @@ def test_learning_table_in_the_benchmarks_readme_is_the_committed_one():
     assert table == (ROOT / "benchmarks/results/learning.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("path", re.findall(r"!\[[^]]*\]\(([^)]+)\)|`((?:tests|benchmarks)/[\w./]+)`", README))
+@pytest.mark.parametrize("path", re.findall(r"!\[[^]]*\]\(([^)]+)\)|`((?:tests|benchmarks|agents)/[\w./]+)`", README))
 def test_files_that_the_readme_names_exist(path):
     assert (ROOT / (path[0] or path[1])).exists()
 

@@ -14,10 +14,11 @@ from browser import chromium, emulate, keep_picture
 from agents.evaluation.metrics import metrics
 from agents.evaluation.players import CLASSICAL
 from agents.evaluation.recording import Recording
-from agents.paper.cases import RESULTS, measure, settings_of
+from agents.paper.cases import measure, settings_of
 from agents.paper.figures import write_series
 from agents.report import colours, command, payload
 from agents.report import roster as lineup
+from agents.report.command import RESULTS
 from agents.report.page import page
 from agents.report.roster import Entry, roster
 from agents.report.runs import Run, play
@@ -71,7 +72,7 @@ def runs():
     paper = [made_up("pd_paper", elbows, start) for elbows in (2, 1, 0) for start in ("paper", "on_target")]
     clipped = [made_up("pd_24v", elbows, "paper") for elbows in (2, 1, 0)]
     told = []
-    entry = Entry("ppo", 2, RESULTS)
+    entry = Entry("ppo", 2)
     learned = play(entry, told.append)
     assert sum(told) == entry.size
     return [*paper, *clipped, *learned]
@@ -187,11 +188,12 @@ def test_colours_can_be_told_from_the_page(background):
             assert shown == colour.lower()
 
 
-def test_every_controller_of_the_benchmark_is_played(tmp_path):
+def test_every_controller_of_the_benchmark_is_played(tmp_path, monkeypatch):
+    assert {entry.elbows for entry in roster() if entry.name == "lqr"} == {2, 1, 0}
+    monkeypatch.setattr(lineup, "OPTIMA", tmp_path)
     expected = {(name, elbows) for name in CLASSICAL for elbows in (2, 1, 0)}
-    assert {(entry.name, entry.elbows) for entry in roster(tmp_path)} >= expected
-    assert not [entry for entry in roster(tmp_path) if entry.name == "lqr"]
-    assert {entry.elbows for entry in roster(RESULTS) if entry.name == "lqr"} == {2, 1, 0}
+    assert {(entry.name, entry.elbows) for entry in roster()} >= expected
+    assert not [entry for entry in roster() if entry.name == "lqr"]
 
 
 def test_policies_are_played_where_they_were_trained(tmp_path, monkeypatch):
@@ -203,14 +205,15 @@ def test_policies_are_played_where_they_were_trained(tmp_path, monkeypatch):
         "sac_table_seed2",
     ]
     monkeypatch.setattr(lineup, "shipped_policies", lambda: shipped)
-    learned = [entry for entry in roster(tmp_path) if entry.name not in CLASSICAL]
+    monkeypatch.setattr(lineup, "OPTIMA", tmp_path)
+    learned = [entry for entry in roster() if entry.name not in CLASSICAL]
     assert [(entry.controller, entry.bearing, entry.env) for entry in learned] == [
         ("ppo", "1", "ElbowArm-v0"),
         ("ppo_random", "2", "ElbowArmRandom-v0"),
         ("sac_cloned", "0", "ElbowArm-v0"),
         ("sac", "table", "ElbowArmTable-v0"),
     ]
-    beside = [entry for entry in roster(tmp_path) if entry.bearing == "table" and entry.name in CLASSICAL]
+    beside = [entry for entry in roster() if entry.bearing == "table" and entry.name in CLASSICAL]
     assert {entry.name for entry in beside} == set(CLASSICAL) - {"pd_paper"}
     assert all(entry.contender()[0].table for entry in beside)
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.control.pd import PAPER_KD, PAPER_KP
 from agents.evaluation.recording import Recording
 from agents.paper import cases as reproduce
 from agents.paper import claims as verdict
 from agents.style import ELBOW_COLOURS
 from elbow_gym import Simulator
+from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.task.circle import Circle
 

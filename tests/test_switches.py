@@ -10,7 +10,8 @@ from strategies import between, cases
 from test_equivalence import assert_close, assume_solvable
 from test_kernel import accelerations
 
-from elbow_gym import dynamics, kernel, motors
+from elbow_gym import dynamics, motors
+from elbow_gym.kernel.rows import ELBOW_SPEED, GEAR_SPEED, STATE_ROWS, SWITCHED_STATE, SWITCHED_STATE_ROWS
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.table import FRICTION_VELOCITY, TableParameters
@@ -75,9 +76,9 @@ def test_fast_form_equals_the_reference_with_every_switch(switches, data):
     under = data.draw(conditions(**on))
     assume_solvable(dynamics.mass_matrix(case.arm, case.q), dynamics.constraint_jacobian(case.arm, case.q, case.elbows))
     rise = np.full(case.arm.n_joints, data.draw(between(0.0, 80.0)) if under.heat else 0.0)
-    state = np.zeros((1, kernel.SWITCHED_STATE_ROWS, case.arm.n_joints))
+    state = np.zeros((1, SWITCHED_STATE_ROWS, case.arm.n_joints))
     state[0, :3] = case.q, case.q_dot, case.current
-    state[0, kernel.SWITCHED_STATE.index("temperature_rise") + kernel.STATE_ROWS] = rise
+    state[0, SWITCHED_STATE.index("temperature_rise") + STATE_ROWS] = rise
     parameters = parameter_table(case.arm, under)[None]
     found = accelerations(1, state, parameters, case.voltage[None], case.elbows, **on)
     for value, reference, tolerance in zip(found, expected(case, under, rise), (1e-9, 1e-9, 1e-12), strict=True):
@@ -85,5 +86,5 @@ def test_fast_form_equals_the_reference_with_every_switch(switches, data):
 
 
 def test_smoothing_speeds_are_the_references():
-    assert kernel.GEAR_SPEED == motors.COULOMB_VELOCITY
-    assert kernel.ELBOW_SPEED == FRICTION_VELOCITY
+    assert GEAR_SPEED == motors.COULOMB_VELOCITY
+    assert ELBOW_SPEED == FRICTION_VELOCITY

@@ -7,12 +7,15 @@ import pytest
 from elbow_gym import Circle, Simulator, paper_arm
 from elbow_gym.kinematics import hand_position
 from elbow_gym.task import observation as task
+from elbow_gym.task.reward import Price
+from elbow_gym.task.sensing import looking
+from elbow_gym.task.targets import Target
 
 ARM = paper_arm()
 CIRCLE = Circle(plane="radial", radius=0.2, period=4.0)
 ANGLE = np.array([0.3, -2.0, 7.0])
 POSE = np.array(ARM.nominal_pose)
-FREE = task.Price(0.0, 0.0, 0.0, regeneration=True)
+FREE = Price(0.0, 0.0, 0.0, regeneration=True)
 LAYOUT = task.ObservationLayout(10)
 FEATURES = {feature.name: feature for feature in task.FEATURES}
 
@@ -28,9 +31,9 @@ def arms():
 
 def look(simulator, price=FREE, spent=0.0):
     path = np.repeat(CIRCLE.path[None], 3, axis=0)
-    target = task.Target(path, ANGLE, np.full(3, CIRCLE.rate * task.LOOKAHEAD))
+    target = Target(path, ANGLE, np.full(3, CIRCLE.rate * task.LOOKAHEAD))
     paid = np.full(3, spent)
-    sight, fill = task.looking(LAYOUT, simulator, POSE, target, price, paid)
+    sight, fill = looking(LAYOUT, simulator, POSE, target, price, paid)
     fill(0, 3)
     return sight
 
@@ -124,7 +127,7 @@ def test_figures_are_the_error_norm_and_the_meters_summed_over_the_joints():
 @pytest.mark.parametrize(("regeneration", "meter"), [(True, "electrical_energy"), (False, "drawn_energy")])
 def test_reward_terms_are_weight_times_error_and_mean_power(regeneration, meter):
     simulator = arms()
-    sight = look(simulator, task.Price(3.0, 0.25, 50.0, regeneration), spent=2.0)
+    sight = look(simulator, Price(3.0, 0.25, 50.0, regeneration), spent=2.0)
     power = (getattr(simulator, meter).sum(axis=1) - 2.0) * 50.0
     np.testing.assert_allclose(sight.figure("electrical_power"), power, rtol=1e-12)
     np.testing.assert_array_equal(sight.figure("reward_tracking"), -3.0 * sight.figure("tracking_error"))
@@ -140,8 +143,8 @@ def test_reward_terms_are_weight_times_error_and_mean_power(regeneration, meter)
 def test_a_look_between_steps_is_free_and_remembers_what_is_paid():
     simulator, spent = arms(), np.zeros(3)
     path = np.repeat(CIRCLE.path[None], 3, axis=0)
-    target = task.Target(path, ANGLE, np.zeros(3))
-    sight, fill = task.looking(LAYOUT, simulator, POSE, target, FREE, spent)
+    target = Target(path, ANGLE, np.zeros(3))
+    sight, fill = looking(LAYOUT, simulator, POSE, target, FREE, spent)
     fill(0, 3)
     np.testing.assert_array_equal(sight.figures[[1, 5, 6, 8]], 0.0)
     np.testing.assert_allclose(spent, simulator.electrical_energy.sum(axis=1), rtol=1e-13)

@@ -21,7 +21,7 @@ from agents.learning.run import Run
 from agents.learning.sac.settings import SACSettings
 from agents.learning.train import train, train_all
 from agents.learning.training_env import MeteredVectorEnv
-from agents.policy import load_policy
+from elbow_gym.baselines.policy import read_policy
 from elbow_gym.task.settings import Settings
 
 SMALL = PPOSettings(
@@ -43,7 +43,7 @@ def done(tmp_path_factory):
 
 
 def weights(folder):
-    return load_policy(folder / "best").weights
+    return read_policy(folder / "best").weights
 
 
 def evaluations(folder):
@@ -135,7 +135,7 @@ def test_interrupted_run_keeps_its_best_policy_and_goes_on(tmp_path, monkeypatch
         result = train(small_run(tmp_path / "run"))
     assert "interrupted; keeping the best policy so far" in capsys.readouterr().err
     assert not result["finished"]
-    assert load_policy(tmp_path / "run/best").card.training["timesteps"] < 512
+    assert read_policy(tmp_path / "run/best").card.training["timesteps"] < 512
     assert train(small_run(tmp_path / "run"), resume=True)["finished"]
 
 
@@ -249,7 +249,7 @@ def test_sac_checkpoint_holds_the_replay_buffer(tmp_path):
 
     run = small_run(tmp_path / "run", algorithm="sac", settings=SAC_SMALL)
     assert train(run)["finished"]
-    card = load_policy(run.folder / "best").card
+    card = read_policy(run.folder / "best").card
     assert (card.algorithm, card.output, card.activation) == ("sac", "tanh", "relu")
     monitored = VecMonitor(SB3VecEnv(MeteredVectorEnv(4, **run.environment)))
     model = load_checkpoint(run.files.checkpoint(), SAC_SMALL.model_class, monitored)

@@ -15,11 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.minimum_jerk import minimum_jerk
-from agents.control.pd import PAPER_KD, PAPER_KP
 from agents.control.posture import best_postures
+from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
+from elbow_gym.checks import positive
 from elbow_gym.env import ElbowArmEnv
 from elbow_gym.kinematics import inverse_kinematics
-from elbow_gym.parameters import ArmParameters, positive
+from elbow_gym.parameters import ArmParameters
 from elbow_gym.task.circle import Circle
 from elbow_gym.vector_env import ElbowArmVectorEnv
 

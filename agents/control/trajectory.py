@@ -16,10 +16,6 @@ from elbow_gym.vector_env import ElbowArmVectorEnv
 Array = NDArray[np.float64]
 
 
-OPTIMA = Path(__file__).parents[2] / "benchmarks" / "results" / "optimal"
-"""Where `python -m benchmarks optimal` leaves the optimal trajectories."""
-
-
 @dataclass(frozen=True)
 class Trajectory:
     """States at the N + 1 ends of the control periods and the voltages held in between."""

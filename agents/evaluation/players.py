@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from agents.control.classical import COMPUTED, ComputedTorque, GravityPD, SmoothPD, economical_computed_torque
 from agents.control.controller import Controller
-from agents.control.pd import CLIPPED, UNLIMITED, PDController
 from agents.evaluation.metrics import REGIMES, UNITS, Regime, joint_energies, metrics
 from agents.evaluation.recording import record
-from agents.policy import Policy, load_policy, pair
-from agents.tasks import registered_arguments, task_settings
+from agents.shipped.seeds import load_policy
+from agents.tasks import task_settings
+from elbow_gym.baselines.pd import CLIPPED, UNLIMITED, PDController
+from elbow_gym.baselines.policy import Policy, pair
+from elbow_gym.baselines.tasks import registered_arguments
 from elbow_gym.simulation.options import TABLE_TIMESTEP
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv

@@ -13,11 +13,12 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
+from agents.learning.actor import policy_of
 from agents.learning.checkpoint import save_checkpoint
 from agents.learning.evaluation import evaluation, evaluation_row, evaluation_seeds, sentence
 from agents.learning.run import Run
 from agents.learning.training_env import MeteredVectorEnv
-from agents.policy import Policy, policy_of
+from elbow_gym.baselines.policy import Policy
 from elbow_gym.task.settings import Settings
 
 

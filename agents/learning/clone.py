@@ -20,8 +20,8 @@ from agents.control.trajectory import Trajectory
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.run import machine, versions
 from agents.learning.run_folder import RunFolder
-from agents.policy import Policy, PolicyCard
 from agents.workers import Job, Tell, in_processes
+from elbow_gym.baselines.policy import Policy, PolicyCard
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 

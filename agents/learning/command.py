@@ -38,7 +38,7 @@ class Task:
     @property
     def name(self) -> str:
         """Short name of the task, such as "elbows2"."""
-        from agents.tasks import task_name
+        from elbow_gym.baselines.tasks import task_name
 
         return task_name(self.env, self.elbows)
 
@@ -71,7 +71,7 @@ class Seeds:
     first_seed: Seed = 0
     """First seed; the others follow it."""
     resume: bool = False
-    """Whether runs go on from their last checkpoints; finished ones are left alone.
+    """Whether runs go on, from their last checkpoint where they have one; finished ones are left alone.
     Without it, a folder that holds a run is refused."""
     output: Path = Path("runs")
     """Folder in which each run gets its own."""
@@ -142,8 +142,8 @@ def clone_command(words: Sequence[str]) -> Callable[..., None]:
 
         Each seed has a folder OUTPUT/clone_elbowsN_seedK with its best policy and evaluations.csv.
         """
-        from agents.control.trajectory import OPTIMA
         from agents.learning.clone import clone_all
+        from agents.shipped import OPTIMA
         from elbow_gym.task.settings import Settings
 
         settings = Settings(elbows=teacher.elbows)
@@ -163,14 +163,14 @@ def runs_of(task: Task, schedule: Schedule, settings: AlgorithmSettings, command
     Raises:
         ValueError: an argument of the environment or of the runs is wrong, or there is no such initial policy.
     """
-    from agents import load_policy
     from agents.learning.run import Run
+    from elbow_gym.baselines.policy import read_policy
 
     policy = schedule.initial_policy
     if policy is not None:
         if not policy.is_file() and not policy.with_name(f"{policy.name}.json").is_file():
             raise ValueError(f"--initial-policy must be the path of a policy's files, got {policy}")
-        load_policy(policy)
+        read_policy(policy)
     algorithm = next(name for name, kind in ALGORITHMS.items() if isinstance(settings, kind))
     name = "_".join(part for part in (algorithm, schedule.label, task.name) if part)
     first = Run(

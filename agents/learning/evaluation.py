@@ -8,7 +8,7 @@ import numpy as np
 
 from agents.evaluation.metrics import metrics
 from agents.evaluation.recording import record
-from agents.policy import Policy
+from elbow_gym.baselines.policy import Policy
 from elbow_gym.task.settings import Settings
 
 EVALUATION_SEEDS = tuple(range(10_000, 10_008))

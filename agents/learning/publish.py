@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from agents.learning.actor import copy_policy
 from agents.learning.run_folder import RunFolder
-from agents.policy import SHIPPED
-from agents.tasks import task_name
+from agents.shipped import CURVES, POLICIES
+from elbow_gym.baselines.policy import BASELINES, pair
+from elbow_gym.baselines.tasks import task_name
 
-CURVES = Path(__file__).parents[2] / "benchmarks" / "results" / "learning"
 LARGEST = 300_000
 """Largest size of a shipped policy's two files together [B]."""
 
 
 def publish(
-    runs: Sequence[Path], policies: Path = SHIPPED, curves: Path = CURVES, replace_seeds: bool = False
+    runs: Sequence[Path],
+    replace_seeds: bool = False,
+    baselines: Path = BASELINES,
+    policies: Path = POLICIES,
+    curves: Path = CURVES,
 ) -> list[str]:
     """Copies the best policy and evaluations.csv of every run; nothing is written unless all can be.
 
     Args:
         runs: folders of finished runs, named ALGORITHM[_LABEL]_TASK_seedK as the training names them.
-        policies: folder of the policies.
-        curves: folder of the curves.
         replace_seeds: remove the shipped seeds of the same algorithm and task that are not among `runs`.
+        baselines: folder for the best seed of each algorithm and task.
+        policies: folder for the other seeds.
+        curves: folder for the curves.
 
     Returns:
         The names of the policies that were published.
@@ -34,19 +41,39 @@ def publish(
     """
     if not runs:
         raise ValueError("runs must be at least one folder of a finished training, got none")
-    folders = [RunFolder(run) for run in runs]
-    names = [_checked(folder) for folder in folders]
-    policies.mkdir(parents=True, exist_ok=True)
-    curves.mkdir(parents=True, exist_ok=True)
-    for folder, name in zip(folders, names, strict=True):
-        folder.copy_best(policies / name)
-        folder.copy_evaluations(curves / f"{name}.csv")
+    files = [RunFolder(run) for run in runs]
+    names = [_checked(run) for run in files]
+    groups = {name.rpartition("_seed")[0] for name in names}
+    for folder in (baselines, policies, curves):
+        folder.mkdir(parents=True, exist_ok=True)
+    for run, name in zip(files, names, strict=True):
+        run.copy_best(policies / name)
+        _remove_policy(baselines / name)
+        run.copy_evaluations(curves / f"{name}.csv")
     if replace_seeds:
-        groups = {name.rpartition("_seed")[0] for name in names}
-        for path in [*policies.iterdir(), *curves.iterdir()]:
+        for path in (path for folder in (baselines, policies, curves) for path in folder.iterdir()):
             if path.stem.rpartition("_seed")[0] in groups and path.stem not in names:
                 path.unlink()
+    for group in groups:
+        _choose_baseline(group, baselines, policies)
     return names
+
+
+def _choose_baseline(group: str, baselines: Path, policies: Path) -> None:
+    """Moves the seed with the best return at its evaluation to the baselines, and the others away from there."""
+    cards = [path for folder in (baselines, policies) for path in folder.glob(f"{group}_seed*.json")]
+    merit = {path: json.loads(path.read_text(encoding="utf-8"))["evaluation"]["return"] for path in cards}
+    best = max(sorted(cards, key=lambda path: int(path.stem.rpartition("_seed")[2])), key=merit.__getitem__)
+    moves = [(path, policies) for path in cards if path.parent == baselines and path != best]
+    moves += [(best, baselines)] if best.parent != baselines else []
+    for path, folder in moves:
+        copy_policy(path, folder / path.stem)
+        _remove_policy(path)
+
+
+def _remove_policy(path: Path) -> None:
+    for file in pair(path):
+        file.unlink(missing_ok=True)
 
 
 def _checked(folder: RunFolder) -> str:

@@ -12,7 +12,7 @@
     result.json                    outcome of the training
 
 model.zip and state.pkl hold pickles, and whoever writes a pickle can run code where it is read: resume only runs of
-your own. The policies hold none, see `agents.policy`.
+your own. The policies hold none, see `elbow_gym.baselines.policy`.
 """
 
 from __future__ import annotations
@@ -29,9 +29,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.files import write_csv, write_folder, write_text, write_whole
+from agents.files import copy_whole, write_csv, write_folder, write_text
+from agents.learning.actor import copy_policy, save_policy
 from agents.learning.evaluation import COLUMNS
-from agents.policy import Policy, load_policy, pair
+from elbow_gym.baselines.policy import Policy, pair, read_policy
 
 RECORD, RESULT, EVALUATIONS, BEST, TENSORBOARD = "run.json", "result.json", "evaluations.csv", "best", "tensorboard"
 CHECKPOINT = "checkpoint_"
@@ -146,30 +147,26 @@ class RunFolder:
 
     def copy_evaluations(self, target: Path) -> None:
         """Copies evaluations.csv, whole."""
-        _copy(self.path / EVALUATIONS, target)
+        copy_whole(self.path / EVALUATIONS, target)
 
     def best(self) -> Policy | None:
         """Policy with the best return so far; None when there is none, or a kill came between its two files."""
         try:
-            return load_policy(self.path / BEST) if pair(self.path / BEST)[0].is_file() else None
+            return read_policy(self.path / BEST) if pair(self.path / BEST)[0].is_file() else None
         except ValueError:
             return None
 
     def write_best(self, policy: Policy) -> None:
         """Writes the policy with the best return so far."""
-        policy.save(self.path / BEST)
+        save_policy(policy, self.path / BEST)
 
     def best_size(self) -> int:
         """Size of the best policy's two files together [B]."""
         return sum(path.stat().st_size for path in pair(self.path / BEST))
 
     def copy_best(self, target: Path) -> None:
-        """Copies the best policy to `target`.json and `target`.safetensors, each whole.
-
-        The card comes last, because a policy is found by it.
-        """
-        for source, copy in reversed(list(zip(pair(self.path / BEST), pair(target), strict=True))):
-            _copy(source, copy)
+        """Copies the best policy's two files, as `copy_policy` does."""
+        copy_policy(self.path / BEST, target)
 
     def checkpoint(self) -> Checkpoint | None:
         """The latest checkpoint; None when there is none."""
@@ -221,10 +218,6 @@ def _read_json(path: Path) -> dict[str, Any]:
 
 def _write_json(path: Path, plain: Mapping[str, Any]) -> None:
     write_text(path, json.dumps(dict(plain), indent=2) + "\n")
-
-
-def _copy(source: Path, target: Path) -> None:
-    write_whole(target, lambda temporary: shutil.copyfile(source, temporary))
 
 
 def _flat(plain: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -94,9 +94,9 @@ def _prepare(run: Run, model: Any, env: Any, keeper: Any) -> None:
     """Gives the model what the training starts from: a policy's weights, or a demonstration and its imitation."""
     if run.initial_policy is not None:
         from agents.learning.warm_start import take_over
-        from agents.policy import load_policy
+        from elbow_gym.baselines.policy import read_policy
 
-        take_over(model, load_policy(run.initial_policy))
+        take_over(model, read_policy(run.initial_policy))
     if isinstance(run.settings, SACSettings) and run.settings.warm_start != "uniform":
         from agents.learning.warm_start import fill, imitate
 

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.control.classical import ComputedTorque
+from agents.learning.actor import actor_layers
 from agents.learning.sac.settings import SACSettings
-from agents.policy import Policy, actor_layers
+from elbow_gym.baselines.policy import Policy
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from agents.control.pd import CLIPPED, UNLIMITED, PDController
 from agents.evaluation.metrics import joint_energies, metrics
 from agents.evaluation.recording import Recording, record, thinned
 from agents.files import write_csv, write_text, write_whole
@@ -18,10 +17,11 @@ from agents.paper.claims import Claim, Numbers, as_markdown, verdict
 from agents.paper.figures import CASES, SETTLED, draw, write_series
 from agents.style import ELBOW_NAMES
 from agents.workers import Job, in_processes
+from elbow_gym.baselines.pd import CLIPPED, UNLIMITED, PDController
 from elbow_gym.parameters import as_elbows
 from elbow_gym.task.settings import Settings
 
-RESULTS = Path(__file__).resolve().parents[2] / "benchmarks" / "results"
+RESULTS = Path(__file__).parent / "results"
 RECORD_PERIOD = 2e-4
 """At most, between the instants that the numbers are taken from [s]; keeping every period takes longer to run."""
 PICTURE_PERIOD = 0.002
@@ -83,7 +83,7 @@ def reproduce(output: Path = Path("reproduction"), publish: bool = False) -> Rep
 
     Args:
         output: folder for fig01.png to fig25.png, paper_cases.png, series.csv, numbers.csv and verdict.md.
-        publish: also refresh the README's picture and numbers under benchmarks/results.
+        publish: also refresh the README's picture and the numbers in agents/paper/results.
     """
     from rich.console import Console
     from rich.markdown import Markdown

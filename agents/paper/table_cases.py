@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from agents.control.pd import PAPER_KD, PAPER_KP
 from agents.evaluation.metrics import metrics
 from agents.evaluation.recording import Array, Recording
 from agents.paper.cases import RECORD_PERIOD
 from agents.paper.figures import SETTLED
+from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
 from elbow_gym.kinematics import hand_position, inverse_kinematics, joint_positions
 from elbow_gym.parameters import ArmParameters
 from elbow_gym.simulator import Simulator

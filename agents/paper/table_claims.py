@@ -39,7 +39,7 @@ def reproduce_on_table(output: Path = Path("reproduction"), publish: bool = Fals
 
     Args:
         output: folder for table_cases.png, table_numbers.csv and table_verdict.md.
-        publish: also refresh the picture and the numbers under benchmarks/results.
+        publish: also refresh the picture and the numbers in agents/paper/results.
     """
     from rich.console import Console
     from rich.markdown import Markdown

@@ -6,10 +6,12 @@ import sys
 from pathlib import Path
 
 from agents.files import write_text
-from agents.paper.cases import RESULTS
 from agents.report.page import page
 from agents.report.roster import roster
 from agents.report.runs import collect
+
+RESULTS = Path(__file__).parents[2] / "benchmarks" / "results"
+"""What `python -m benchmarks` wrote; only read here."""
 
 
 def report(output: Path, results: Path = RESULTS) -> Path:
@@ -17,11 +19,11 @@ def report(output: Path, results: Path = RESULTS) -> Path:
 
     Args:
         output: the HTML file.
-        results: folder of the benchmark's results: its tables, its front and the trajectories that the LQR follows.
+        results: folder of the benchmark's results: its tables and its front.
     """
     from tqdm import tqdm
 
-    entries = roster(results)
+    entries = roster()
     layout = "{desc} {percentage:3.0f}%|{bar}| {elapsed} elapsed, {remaining} left"
     total = sum(entry.size for entry in entries)
     # Work is told of in bursts: the time left follows the mean speed.

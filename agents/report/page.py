@@ -14,7 +14,8 @@ from agents.report.colours import stylesheet
 from agents.report.payload import payload
 from agents.report.runs import Run
 
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).parent / "web"
+"""The page's own markup, style and scripts."""
 SCRIPTS = (
     "data",
     "state",

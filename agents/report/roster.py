@@ -12,7 +12,8 @@ from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import Trajectory
 from agents.evaluation.players import CLASSICAL, named_controller
 from agents.paper.figures import CASES
-from agents.policy import shipped_policies
+from agents.shipped import OPTIMA
+from agents.shipped.seeds import shipped_policies
 from agents.tasks import POLICY_NAME
 from elbow_gym.task.settings import STARTS, Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
@@ -31,8 +32,6 @@ class Entry:
     """As `agents.evaluation.players.named_controller` knows it, or "lqr"."""
     elbows: int
     """On the rigid table."""
-    results: Path
-    """Folder of the benchmark's results."""
     env: str = "ElbowArm-v0"
     """Id of the environment that a learned one was trained in; on the compliant table, where all play."""
 
@@ -57,7 +56,7 @@ class Entry:
         if self.name == "lqr":
 
             def follow(env: ElbowArmVectorEnv) -> Controller:
-                return TimeVaryingLQR(env, Trajectory.load(trajectory(self.results, self.elbows, env.settings.start)))
+                return TimeVaryingLQR(env, Trajectory.load(trajectory(self.elbows, env.settings.start)))
 
             return Settings(elbows=self.elbows), follow
         settings, make = named_controller(self.name, self.elbows, self.env)
@@ -65,21 +64,19 @@ class Entry:
         return (Settings(elbows=self.elbows) if self.env == "ElbowArmRandom-v0" else settings), make
 
 
-def trajectory(results: Path, elbows: int, start: str) -> Path:
+def trajectory(elbows: int, start: str) -> Path:
     """Where `python -m benchmarks optimal` leaves the optimal trajectory of the default reward."""
-    return results / "optimal" / f"elbows{elbows}{'_on_target' if start == 'on_target' else ''}.npz"
+    return OPTIMA / f"elbows{elbows}{'_on_target' if start == 'on_target' else ''}.npz"
 
 
-def roster(results: Path) -> list[Entry]:
+def roster() -> list[Entry]:
     """The classical controllers, and the LQR and the learned policies as far as their files are there.
 
     Where a policy for the compliant table is shipped, the classical ones but the 10 kHz PD play on it too.
     """
-    entries = [Entry(name, elbows, results) for name in CLASSICAL for elbows in CASES]
+    entries = [Entry(name, elbows) for name in CLASSICAL for elbows in CASES]
     entries += [
-        Entry("lqr", elbows, results)
-        for elbows in CASES
-        if all(trajectory(results, elbows, start).is_file() for start in STARTS)
+        Entry("lqr", elbows) for elbows in CASES if all(trajectory(elbows, start).is_file() for start in STARTS)
     ]
     learned, tabletop = [], []
     # Several seeds make one entry, which plays the best.
@@ -87,13 +84,13 @@ def roster(results: Path) -> list[Entry]:
     for found in filter(None, map(POLICY_NAME.fullmatch, names)):
         name, task = found.group("controller", "task")
         if task == "table":
-            tabletop.append(Entry(name, 0, results, "ElbowArmTable-v0"))
+            tabletop.append(Entry(name, 0, "ElbowArmTable-v0"))
         elif task == "random":
-            learned.append(Entry(name, 2, results, "ElbowArmRandom-v0"))
+            learned.append(Entry(name, 2, "ElbowArmRandom-v0"))
         else:
-            learned.append(Entry(name, int(task.removeprefix("elbows")), results))
+            learned.append(Entry(name, int(task.removeprefix("elbows"))))
     entries += sorted(learned, key=lambda entry: (entry.controller, -entry.elbows))
     if tabletop:
-        entries += [Entry(name, 0, results, "ElbowArmTable-v0") for name in CLASSICAL if name != "pd_paper"]
+        entries += [Entry(name, 0, "ElbowArmTable-v0") for name in CLASSICAL if name != "pd_paper"]
         entries += sorted(tabletop, key=lambda entry: entry.controller)
     return entries

@@ -13,7 +13,7 @@ import numpy as np
 from agents.evaluation.players import named_controller
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES
 from agents.watch.video import FRAME_RATES, Pixels, check_video, write_video
-from elbow_gym.parameters import positive
+from elbow_gym.checks import positive
 from elbow_gym.rendering.overlay import Instruments
 from elbow_gym.rendering.painter import Colour
 from elbow_gym.rendering.screen import Window, display_driver, load_pygame, pixels_of

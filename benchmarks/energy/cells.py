@@ -9,13 +9,14 @@ from typing import Any
 
 from agents.control.controller import EFFORT, Controller
 from agents.control.lqr import TimeVaryingLQR
-from agents.control.pd import PAPER_KD, PAPER_KP, PDController
 from agents.control.trajectory import Trajectory
 from agents.evaluation.metrics import REGIMES, Regime
 from agents.evaluation.players import CLASSICAL, SHIFTED, policy_maker, settings_for
-from agents.policy import SHIPPED, load_policy, shipped_policies, shipped_seeds
+from agents.shipped.seeds import shipped_path, shipped_policies, shipped_seeds
 from agents.tasks import POLICY_NAME
 from benchmarks import optimal
+from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP, PDController
+from elbow_gym.baselines.policy import read_policy
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -128,7 +129,7 @@ def contenders(cell: Cell) -> list[Contender]:
         effort = EFFORT.get(cell.controller, 1.0)
         return [Contender(cell.settings(arguments), make, f"{cell.controller} x {cell.gain:g}", effort)]
     name = learned()[cell]
-    policies = [(seed, load_policy(SHIPPED / f"{name}_seed{seed}")) for seed in shipped_seeds(name)]
+    policies = [(seed, read_policy(shipped_path(name, seed))) for seed in shipped_seeds(name)]
     return [
         Contender(cell.settings({}), policy_maker(policy), policy.card.digest, seed=seed) for seed, policy in policies
     ]

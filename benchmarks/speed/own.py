@@ -100,16 +100,18 @@ def kernel_accelerations(
     arm: ArmParameters, elbows: tuple[int, ...], state: Array, voltage: Array
 ) -> tuple[Callable[[], None], Array, Array]:
     """The kernel's evaluation of a batch of states (B, 3, n), as a call, with the q_ddot and current_dot it fills."""
-    from elbow_gym import kernel
+    from elbow_gym.kernel.build import kernel
+    from elbow_gym.kernel.rows import STATE_ROWS
+    from elbow_gym.kernel.slots import BLOCK_LANES
     from elbow_gym.simulation.parameter_rows import parameter_table
 
     arms, _, joints = state.shape
-    full = np.zeros((arms, kernel.STATE_ROWS, joints))
+    full = np.zeros((arms, STATE_ROWS, joints))
     full[:, :3] = state
     parameters = np.repeat(parameter_table(arm)[None], arms, axis=0)
     index = np.array(elbows, dtype=np.int64)
     q_ddot, current_dot, force = np.zeros((arms, joints)), np.zeros((arms, joints)), np.zeros((arms, len(elbows)))
-    compiled = kernel.kernel(1 if arms == 1 else kernel.BLOCK_LANES).accelerations
+    compiled = kernel(1 if arms == 1 else BLOCK_LANES).accelerations
 
     def evaluate() -> None:
         compiled(full, parameters, voltage, index, q_ddot, current_dot, force)

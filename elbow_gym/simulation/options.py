@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from elbow_gym.checks import non_negative, positive
 from elbow_gym.motors import COULOMB_VELOCITY
-from elbow_gym.parameters import ArmParameters, non_negative, positive
+from elbow_gym.parameters import ArmParameters
 from elbow_gym.table import TableParameters, as_table
 
 # Contact on a table of the default stiffness wants RK4 steps no longer than this [s].

@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elbow_gym import kernel
+from elbow_gym.kernel.rows import PARAMETERS
 from elbow_gym.parameters import (
     ArmParameters,
     Array,
@@ -75,23 +75,10 @@ def parameter_rows(
         "sag": (conditions.supply_resistance / np.asarray(supply_voltage) ** 2)[..., None] * one,
         "bus_floor": (NO_FLOOR if conditions.regeneration else 0.0) * one,
     }
-    return np.stack([rows[name] for name in kernel.PARAMETERS], axis=-2)
+    return np.stack([rows[name] for name in PARAMETERS], axis=-2)
 
 
 def parameter_table(arm: ArmParameters, conditions: Conditions | None = None) -> Array:
     """The kernel's parameter rows of one arm, shape (PARAMETER_ROWS, n)."""
     under = Conditions() if conditions is None else conditions
     return parameter_rows(quantities(arm), arm.gravity, under, under.payload, under.supply_voltage)
-
-
-def as_batch(name: str, value: ArrayLike, shape: tuple[int, int]) -> Array:
-    """A quantity as (B, n) float64, from (B, n) or one row for all. ValueError naming `name` unless finite numbers."""
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must be numbers of shape {shape} or {shape[1:]}, got {value!r}") from error
-    if array.shape not in (shape, shape[1:]):
-        raise ValueError(f"{name} must have shape {shape} or {shape[1:]}, got {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
-    return np.broadcast_to(array, shape)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym import kernel
+from elbow_gym.kernel.rows import BELOW_TABLE, HAND, LOWEST, STATE_ROWS, SUMMARY_COLUMNS, SWITCHED_STATE, VALID
 from elbow_gym.parameters import Array
 
 
@@ -72,32 +72,32 @@ class Readings:
     @property
     def hand_position(self) -> Array:
         """Hand position [m], (B, 3), in world x, y, z."""
-        return self._columns(kernel.HAND, kernel.HAND + 3)
+        return self._columns(HAND, HAND + 3)
 
     @property
     def lowest_height(self) -> Array:
         """Height of the lowest of joints 3..n and the hand [m], (B,)."""
-        return self._columns(kernel.LOWEST, kernel.LOWEST + 1)[:, 0]
+        return self._columns(LOWEST, LOWEST + 1)[:, 0]
 
     @property
     def below_table(self) -> Array:
         """Time since the reset with a joint or the hand more than 1e-6 m under z = 0 [s], (B,)."""
-        return self._columns(kernel.BELOW_TABLE, kernel.BELOW_TABLE + 1)[:, 0]
+        return self._columns(BELOW_TABLE, BELOW_TABLE + 1)[:, 0]
 
     @property
     def valid(self) -> NDArray[np.bool_]:
         """False where the last step left what float64 can represent (the state is then the one before), (B,)."""
-        return self._summary[:, kernel.VALID] > 0.0
+        return self._summary[:, VALID] > 0.0
 
     @property
     def elbow_force(self) -> Array:
         """f_n of the table on each elbow along +z [N], (B, p); negative when the table pulls."""
-        return self._columns(kernel.SUMMARY_COLUMNS, None)
+        return self._columns(SUMMARY_COLUMNS, None)
 
     def _switched(self, name: str) -> Array:
-        if self._state.shape[1] == kernel.STATE_ROWS:
+        if self._state.shape[1] == STATE_ROWS:
             return np.zeros((self._state.shape[0], self._state.shape[2]))
-        return self._row(kernel.STATE_ROWS + kernel.SWITCHED_STATE.index(name))
+        return self._row(STATE_ROWS + SWITCHED_STATE.index(name))
 
     @property
     def contact_force(self) -> Array:

@@ -13,8 +13,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elbow_gym import kernel
-from elbow_gym.parameters import ArmParameters, Array, check_entries, finite, positive
+from elbow_gym.checks import check_entries, finite, positive
+from elbow_gym.kernel import observe
+from elbow_gym.parameters import ArmParameters, Array
 from elbow_gym.task.fourier_path import (
     PLANES,
     Point,
@@ -187,7 +188,7 @@ class Circle:
 def _points(path: Array, angle: ArrayLike) -> Array:
     angle = np.asarray(angle, dtype=np.float64)
     points = np.empty((angle.size, 3))
-    kernel.path(path, angle.ravel(), points)
+    observe.path(path, angle.ravel(), points)
     return points.reshape(*angle.shape, 3)
 
 

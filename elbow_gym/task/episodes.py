@@ -9,21 +9,23 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym import kernel
+from elbow_gym.checks import check_entries, check_restorable, require_entries, restore
+from elbow_gym.kernel.rows import FIGURES
 from elbow_gym.kinematics import inverse_kinematics
-from elbow_gym.parameters import Array, check_entries
+from elbow_gym.parameters import Array
 from elbow_gym.simulator import Simulator
-from elbow_gym.task import observation as task
-from elbow_gym.task.actuation_and_sensing import Extras
+from elbow_gym.task.actuation import Actuation
 from elbow_gym.task.arm_batch import Population
 from elbow_gym.task.circle import Circle, check_reachable
+from elbow_gym.task.reward import Price, early_end
+from elbow_gym.task.sensing import Sensing, Sight, looking
 from elbow_gym.task.settings import Settings
 from elbow_gym.task.targets import Targets
 
 RESET_OPTIONS = ("state", "phase", "circle", "parameters")
 STATE_ENTRIES = ("q", "q_dot", "current", "temperature_rise")
 # The last figure is the reward itself.
-INFO_FIGURES = kernel.FIGURES[:-1]
+INFO_FIGURES = FIGURES[:-1]
 
 
 class Outcome(NamedTuple):
@@ -66,8 +68,9 @@ class Episodes:
         """Start pose [rad], (n,): the nominal one, on the elbows' plane. Observed angles count from it."""
         self.population = Population(self.arm, conditions, settings.randomization, num_envs)
         self.targets = Targets(self.circle, num_envs, settings.control_period)
-        self.extras = Extras(settings, self.simulator, self.population)
-        self.layout = task.ObservationLayout(self.arm.n_joints, self.extras.sizes)
+        self.actuation = Actuation(settings, self.population, num_envs)
+        self.sensing = Sensing(settings, self.simulator, self.population, self.actuation.queue)
+        self.layout = self.sensing.layout
         self._n_substeps, self._horizon = settings.n_substeps, settings.horizon
         if settings.start == "on_target" and not self.circle.random:
             inverse_kinematics(self.arm, self.pose, self.circle.position(np.linspace(0.0, 2.0 * np.pi, 73)))
@@ -123,7 +126,8 @@ class Episodes:
             self.simulator.set_parameters(chosen, before[1])
             raise
         self.targets.put(chosen, circles)
-        self.extras.reset(chosen, drawing)
+        self.actuation.reset(chosen)
+        self.sensing.set_noise(chosen, drawing)
         self._steps[chosen] = 0
         self._spent[chosen] = 0.0
 
@@ -131,7 +135,7 @@ class Episodes:
         if given is None and not self.population.randomization.ranges and not self.population.changed:
             return
         values = self.population.draw(generators, given)
-        self.extras.check(values)
+        self.actuation.check(values)
         rows = self.population.put(chosen, values)
         if given is not None and "length" in given:
             for arm in self.population.arms(chosen):
@@ -171,61 +175,54 @@ class Episodes:
 
         Raises ValueError, with the state untouched, when an action is not a number.
         """
-        voltage = self.extras.voltage(action)
+        voltage = self.actuation.voltage(action)
         self._steps += 1
         settings = self.settings
-        price = task.Price(self.tracking_weight, self.energy_weight, settings.control_frequency, settings.regeneration)
+        price = Price(self.tracking_weight, self.energy_weight, settings.control_frequency, settings.regeneration)
         sight, look = self._looking(price)
         invalid = self.simulator.advance(voltage, self._n_substeps, look)
-        self.extras.see(self.layout, sight.observation, waiting)
+        self.sensing.complete(sight.observation, waiting)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
         truncated = self._steps >= self._horizon
         if invalid:
             terminated = ~self.simulator.valid
-            self._charge_the_rest(terminated, sight)
+            self._charge_the_rest(terminated, sight, price)
             truncated &= ~terminated
         info = self.info(sight, voltage)
         return Outcome(sight.observation, sight.figure("reward"), terminated, truncated, info)
 
-    def _charge_the_rest(self, terminated: NDArray[np.bool_], sight: task.Sight) -> None:
-        """Ending early never pays: the remaining time costs the worst that the observation's bounds allow."""
-        bound = self.layout.high * self.layout.scale
-        worst_error = np.linalg.norm(bound[self.layout.slices["hand_error"]])
-        worst_power = self.settings.voltage_limit * bound[self.layout.slices["current"]].sum()
+    def _charge_the_rest(self, terminated: NDArray[np.bool_], sight: Sight, price: Price) -> None:
+        """Puts the worst reward for the remaining time, this step included, in place of the terminated arms'."""
         rest = np.maximum(self.settings.horizon - self._steps + 1, 1)[terminated]
-        tracking = -self.tracking_weight * (worst_error * rest)
-        sight.figure("reward_tracking")[terminated] = tracking
-        sight.figure("reward_energy")[terminated] = -self.energy_weight * (worst_power * rest)
-        fused = [
-            kernel.fused(-worst_power * left, self.energy_weight, term)
-            for left, term in zip(rest, tracking, strict=True)
-        ]
-        sight.figure("reward")[terminated] = fused
+        charge = early_end(self.layout, float(self.settings.voltage_limit), price, rest)
+        sight.figure("reward_tracking")[terminated] = charge.tracking
+        sight.figure("reward_energy")[terminated] = charge.energy
+        sight.figure("reward")[terminated] = charge.total
 
     def angle(self) -> Array:
         """Each target's angle on its circle now [rad], (B,)."""
         return self.targets.angle(self._steps)
 
-    def _looking(self, price: task.Price) -> tuple[task.Sight, Callable[[int, int], None]]:
+    def _looking(self, price: Price) -> tuple[Sight, Callable[[int, int], None]]:
         target = self.targets.after(self._steps)
-        return task.looking(self.layout, self.simulator, self.pose, target, price, self._spent)
+        return looking(self.layout, self.simulator, self.pose, target, price, self._spent)
 
-    def look(self, resting: NDArray[np.bool_] | None = None) -> task.Sight:
+    def look(self, resting: NDArray[np.bool_] | None = None) -> Sight:
         """What is seen of every arm now, between control steps: power and rewards are zero.
 
         Arms of the mask `resting` draw no noise, since they have not been reset.
         """
-        sight, look = self._looking(task.Price(0.0, 0.0, 0.0, self.settings.regeneration))
+        sight, look = self._looking(Price(0.0, 0.0, 0.0, self.settings.regeneration))
         look(0, self.num_envs)
-        self.extras.see(self.layout, sight.observation, resting)
+        self.sensing.complete(sight.observation, resting)
         return sight
 
-    def info(self, sight: task.Sight, voltage: Array | None = None) -> dict[str, Any]:
+    def info(self, sight: Sight, voltage: Array | None = None) -> dict[str, Any]:
         """Fresh arrays of the step's figures, one row per arm; without a voltage, of a reset: also what was drawn."""
         info: dict[str, Any] = dict(zip(INFO_FIGURES, sight.figures, strict=False))
         info["voltage"] = np.zeros((self.num_envs, self.arm.n_joints)) if voltage is None else voltage
         info["elbow_force"] = self.simulator.elbow_force.copy()
-        info.update(self.extras.info())
+        info.update(self.sensing.info())
         if voltage is None:
             if self.population.randomization.ranges or self.population.changed:
                 info["parameters"] = self.population.copy()
@@ -237,24 +234,19 @@ class Episodes:
         """A copy of everything that runs on but the generators."""
         own = {"steps": self._steps.copy(), "spent": self._spent.copy()}
         parts = {"targets": self.targets.get_state(), "parameters": self.population.copy()}
-        return {"simulator": self.simulator.get_state(), **parts, "queue": self.extras.queue.copy(), **own}
+        return {"simulator": self.simulator.get_state(), **parts, "queue": self.actuation.queue.copy(), **own}
 
     def set_state(self, state: Mapping[str, Any], generators: Sequence[np.random.Generator]) -> None:
         """Takes a state of `get_state` from episodes of the same settings and size, and each arm's generator."""
-        own = {"steps": self._steps, "spent": self._spent, "queue": self.extras.queue}
-        for name in (*own, "simulator", "targets", "parameters"):
-            if name not in state:
-                raise ValueError(f"state must have the entry {name!r}, got {sorted(state)}")
-        for name, array in own.items():
-            if np.shape(state[name]) != array.shape:
-                raise ValueError(f"state[{name!r}] must have shape {array.shape}, got {np.shape(state[name])}")
+        own = {"steps": self._steps, "spent": self._spent, "queue": self.actuation.queue}
+        require_entries(state, (*own, "simulator", "targets", "parameters"), "state")
+        check_restorable(own, state)
         self.simulator.set_state(state["simulator"])
         self.targets.set_state(state["targets"])
         everyone = np.arange(self.num_envs)
         self.simulator.set_parameters(everyone, self.population.put(everyone, state["parameters"]))
-        for name, array in own.items():
-            array[...] = state[name]
-        self.extras.listen(everyone, generators)
+        restore(own, state)
+        self.sensing.set_noise(everyone, generators)
 
 
 def given_state(state: object) -> dict[str, Any] | None:
@@ -265,6 +257,5 @@ def given_state(state: object) -> dict[str, Any] | None:
         raise ValueError(f"options['state'] must be a dict, got {state!r}")
     plain = cast("Mapping[str, Any]", state)
     check_entries(plain, set(STATE_ENTRIES), "options['state']")
-    if "q" not in plain:
-        raise ValueError(f"options['state'] must have the entry 'q', got {sorted(plain)}")
+    require_entries(plain, ("q",), "options['state']")
     return dict(plain)

@@ -1,8 +1,8 @@
-"""What an agent sees and what it is paid: pure functions of (B, ...) arrays."""
+"""Entries of the observation: their names, units, scales and limits, and how they are decoded."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -10,9 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from elbow_gym import kernel
 from elbow_gym.parameters import Array
-from elbow_gym.simulator import Simulator
 
 OBSERVATION_VERSION = 1
 LOOKAHEAD = 0.1
@@ -111,64 +109,3 @@ class ObservationLayout:
         """The quantities in SI units, by feature name, each (..., size)."""
         quantities = np.asarray(observation, dtype=np.float64) * self.scale
         return {name: quantities[..., where] for name, where in self.slices.items()}
-
-
-class Target(NamedTuple):
-    """What the hands of B arms should follow, at an instant."""
-
-    path: Array
-    """Each arm's path as Fourier rows [m], (B, rows, 3)."""
-    angle: Array
-    """Where the target stands on it [rad], (B,)."""
-    lookahead: Array
-    """Angle between the target and the look-ahead target [rad], (B,)."""
-
-
-class Price(NamedTuple):
-    """What the reward charges."""
-
-    tracking_weight: float
-    """Per metre of tracking error at the end of a control step [1/m]."""
-    energy_weight: float
-    """Per watt of mean electrical power over it [1/W]."""
-    control_frequency: float
-    """Control steps per second [Hz]."""
-    regeneration: bool
-    """Whether negative power is credited."""
-
-
-class Sight(NamedTuple):
-    """What is seen of B arms at an instant, and what the control step that ends there is paid."""
-
-    observation: NDArray[np.float32]
-    """(B, size), scaled and saturated."""
-    figures: Array
-    """Rows of `kernel.FIGURES`: energies [J] and time under the table [s] since the reset, summed over the joints."""
-
-    def figure(self, name: str) -> Array:
-        """A row of the figures by name, (B,)."""
-        return self.figures[kernel.FIGURES.index(name)]
-
-
-def looking(
-    layout: ObservationLayout, simulator: Simulator, pose: Array, target: Target, price: Price, spent: Array
-) -> tuple[Sight, Callable[[int, int], None]]:
-    """A sight still empty, and the function that fills its rows of arms first..end-1 when they have moved.
-
-    Args:
-        layout: the observation's entries.
-        simulator: the arms.
-        pose: what joint angles are counted from [rad], (n,).
-        target: what the hands should follow.
-        price: the reward's terms are -tracking_weight |hand - target| and -energy_weight P.
-        spent: energy paid before this control step [J], (B,), brought up to date.
-    """
-    arms = simulator.num_envs
-    sight = Sight(np.empty((arms, layout.size), np.float32), np.empty((len(kernel.FIGURES), arms)))
-
-    def look(first: int, end: int) -> None:
-        kernel.observe(
-            *simulator.raw, pose, *target, layout.scale, layout.high, tuple(price), spent, *sight, first, end
-        )
-
-    return sight, look

@@ -7,7 +7,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from elbow_gym.parameters import Array, check_entries, non_negative, positive
+from elbow_gym.checks import check_entries, non_negative, positive
+from elbow_gym.parameters import Array
 from elbow_gym.task.ranges import Range, as_range, ends
 
 # One factor on the nominal value per link or motor.

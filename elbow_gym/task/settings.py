@@ -8,7 +8,8 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
-from elbow_gym.parameters import ArmParameters, as_arm, as_elbows, non_negative, positive
+from elbow_gym.checks import non_negative, positive
+from elbow_gym.parameters import ArmParameters, as_arm, as_elbows
 from elbow_gym.simulation.options import TABLE_TIMESTEP, Conditions
 from elbow_gym.table import TableParameters, as_table
 from elbow_gym.task.circle import Circle, as_circle, check_reachable

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from elbow_gym.checks import restore
 from elbow_gym.parameters import Array
 from elbow_gym.task.circle import Circle, as_phase
-from elbow_gym.task.observation import LOOKAHEAD, Target
+from elbow_gym.task.observation import LOOKAHEAD
+
+
+class Target(NamedTuple):
+    """What the hands of B arms should follow, at an instant."""
+
+    path: Array
+    """Each arm's path as Fourier rows [m], (B, rows, 3)."""
+    angle: Array
+    """Where the target stands on it [rad], (B,)."""
+    lookahead: Array
+    """Angle between the target and the look-ahead target [rad], (B,)."""
 
 
 class Targets:
@@ -94,12 +106,7 @@ class Targets:
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Takes a state of `get_state`. ValueError when it is of another number of arms or shape of path."""
         own = {"path": self._path, "rate": self._rate, "phase": self._phase}
-        for name, array in own.items():
-            if name not in state or np.shape(state[name]) != array.shape:
-                got = np.shape(state[name]) if name in state else "nothing"
-                raise ValueError(f"state[{name!r}] must have shape {array.shape}, got {got}")
-        for name, array in own.items():
-            array[...] = state[name]
+        restore(own, state)
         self._pace()
         self.circles = list(state["circles"])
         self._alike = bool((self._path == self._path[0]).all())

@@ -10,7 +10,8 @@ import pytest
 from agents.__main__ import app
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.presets import default_settings
-from agents.policy import SHIPPED, load_policy, shipped_policies
+from agents.shipped.seeds import shipped_path, shipped_policies
+from elbow_gym.baselines.policy import read_policy
 
 
 @pytest.fixture
@@ -30,6 +31,11 @@ def runs(monkeypatch):
         return list(trained)
 
     return parsed
+
+
+def card_of(name):
+    group, _, seed = name.rpartition("_seed")
+    return read_policy(shipped_path(group, int(seed))).card
 
 
 @pytest.mark.parametrize(
@@ -87,7 +93,7 @@ def test_seeds_have_a_run_each_with_the_environment_asked_for(runs):
 
 @pytest.mark.parametrize("name", [name for name in shipped_policies() if not name.startswith("clone")])
 def test_commands_in_policy_cards_train_the_task_and_the_settings_of_the_card(runs, name):
-    card = load_policy(SHIPPED / name).card
+    card = card_of(name)
     words = card.command.removeprefix("python -m agents ")
     run = next(run for run in runs(words) if run.seed == card.training["seed"])
     assert (run.algorithm, run.env) == (card.algorithm, card.env)
@@ -100,7 +106,7 @@ def test_commands_in_clones_cards_clone_with_the_settings_of_the_card(monkeypatc
     cloned = []
     monkeypatch.setattr("agents.learning.clone.clone_all", lambda *arguments: cloned.append(arguments) or {})
     for name in [name for name in shipped_policies() if name.startswith("clone")]:
-        card = load_policy(SHIPPED / name).card
+        card = card_of(name)
         app.run(card.command.removeprefix("python -m agents ").split())
         settings, trajectory, how, seeds, folders, command, resume = cloned.pop()
         assert card.training["seed"] in seeds

@@ -8,7 +8,8 @@ import pytest
 
 from agents.learning.evaluation import COLUMNS
 from agents.learning.run_folder import RunFolder
-from agents.policy import SHIPPED, load_policy
+from agents.shipped.seeds import load_policy
+from elbow_gym.baselines.policy import read_policy
 
 RECORD = {"algorithm": "ppo", "settings": {"gamma": 0.98, "hidden": [64, 64]}, "seed": 0}
 ROW = [float(k) for k in range(len(COLUMNS))]
@@ -21,7 +22,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def policy():
-    return load_policy(SHIPPED / "ppo_elbows2_seed0")
+    return load_policy("ppo", elbows=2, seed=0)
 
 
 def write_checkpoint(folder, steps, buffer=None):
@@ -135,6 +136,6 @@ def test_copies_are_whole_and_equal(folder, policy, tmp_path):
     folder.write_best(policy)
     folder.copy_best(tmp_path / "policies" / "copied")
     folder.copy_evaluations(tmp_path / "curves" / "copied.csv")
-    assert load_policy(tmp_path / "policies" / "copied").card == folder.best().card
+    assert read_policy(tmp_path / "policies" / "copied").card == folder.best().card
     assert (tmp_path / "curves" / "copied.csv").read_bytes() == (folder.path / "evaluations.csv").read_bytes()
     assert sorted(path.name for path in (tmp_path / "policies").iterdir()) == ["copied.json", "copied.safetensors"]

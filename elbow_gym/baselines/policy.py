@@ -4,33 +4,34 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.files import write_text, write_whole
-from agents.tasks import task_name
+from elbow_gym.baselines.tasks import task_name
 from elbow_gym.env import ElbowArmEnv
 from elbow_gym.task.observation import OBSERVATION_VERSION
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
-SHIPPED = Path(__file__).parent / "policies"
+BASELINES = Path(__file__).parent / "policies"
+"""One policy for each algorithm and task, ALGORITHM[_LABEL]_TASK_seedK: the best of its training seeds."""
 FORMAT = 1
-ACTIVATIONS = {
+Weights = dict[str, NDArray[np.float32]]
+Layer = Callable[[NDArray[np.float32]], NDArray[np.float32]]
+
+ACTIVATIONS: dict[str, Layer] = {
     "tanh": np.tanh,
     "relu": lambda x: np.maximum(x, 0.0),
     "elu": lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0))),
     "silu": lambda x: x * np.exp(-np.logaddexp(0.0, -x)),
 }
-OUTPUTS = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
+OUTPUTS: dict[str, Layer] = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
 """How the last layer becomes an action: PPO's is clipped, SAC's squashed."""
-
-Weights = dict[str, NDArray[np.float32]]
 
 
 @dataclass(frozen=True)
@@ -56,9 +57,9 @@ class PolicyCard:
     """SHA-256 of the weights."""
     observation_version: int = OBSERVATION_VERSION
     format: int = FORMAT
-    training: dict[str, Any] = field(default_factory=dict)
-    evaluation: dict[str, Any] = field(default_factory=dict)
-    versions: dict[str, str] = field(default_factory=dict)
+    training: dict[str, Any] = field(default_factory=dict[str, Any])
+    evaluation: dict[str, Any] = field(default_factory=dict[str, Any])
+    versions: dict[str, str] = field(default_factory=dict[str, str])
 
 
 class Policy:
@@ -95,18 +96,16 @@ class Policy:
             raise ValueError(
                 f"observation_version of the policy must be {OBSERVATION_VERSION}, got {self.card.observation_version}"
             )
-        names = env.unwrapped.observation_names
+        given = cast("ElbowArmEnv | ElbowArmVectorEnv", env.unwrapped)
+        names = given.observation_names
         if self.card.observation != names:
             raise ValueError(
                 f"observation of the policy must be the environment's {names}, got {self.card.observation}"
             )
-        trained, given = self.settings, env.unwrapped.settings
         for name in ("elbow_joints", "action_unit", "voltage_limit", "control_frequency"):
-            if getattr(trained, name) != getattr(given, name):
-                raise ValueError(
-                    f"{name} of the environment must be {getattr(trained, name)!r} as in training, "
-                    f"got {getattr(given, name)!r}"
-                )
+            trained, found = getattr(self.settings, name), getattr(given.settings, name)
+            if trained != found:
+                raise ValueError(f"{name} of the environment must be {trained!r} as in training, got {found!r}")
 
     @property
     def settings(self) -> Settings:
@@ -141,14 +140,6 @@ class Policy:
         layers[-1] = torch.nn.Tanh() if self.card.output == "tanh" else torch.nn.Hardtanh()
         return torch.nn.Sequential(*layers)
 
-    def save(self, path: Path) -> None:
-        """Writes `path`.safetensors and `path`.json, each whole or not at all."""
-        from safetensors.numpy import save_file
-
-        card, weights = pair(path)
-        write_whole(weights, lambda temporary: save_file(self.weights, temporary))
-        write_text(card, json.dumps(asdict(self.card), indent=2) + "\n")
-
 
 def digest_of(weights: Mapping[str, NDArray[np.float32]]) -> str:
     """SHA-256 of the weights, name by name."""
@@ -159,119 +150,59 @@ def digest_of(weights: Mapping[str, NDArray[np.float32]]) -> str:
     return digest.hexdigest()
 
 
-def load_policy(
-    source: str | Path, elbows: int | None = None, env: str | None = None, seed: int | None = None
-) -> Policy:
-    """A policy from a file, or a shipped one: `load_policy("ppo", elbows=2)`, `load_policy("ppo", env="...")`.
+def load_policy(source: str | Path, elbows: int | None = None, env: str | None = None) -> Policy:
+    """A policy from a file, or a baseline: `load_policy("ppo", elbows=2)`, `load_policy("ppo", env="...")`.
 
     Args:
-        source: a path with or without suffix; with `elbows` or `env` a shipped policy's algorithm.
+        source: a path with or without suffix; with `elbows` or `env` a baseline's algorithm.
         elbows: elbows that it was trained with; those of `env` when None.
         env: id of the environment that it was trained in; "ElbowArm-v0" when None.
-        seed: of its training; the one with the best return at its evaluation when None.
 
     Raises:
         ValueError: there is no such policy, or its files do not fit each other.
     """
-    from safetensors.numpy import load_file
+    if elbows is None and env is None:
+        return read_policy(Path(source))
+    return read_policy(baseline_path(f"{source}_{task_name(env or 'ElbowArm-v0', elbows)}"))
 
-    shipped = elbows is not None or env is not None or seed is not None
-    path = shipped_path(f"{source}_{task_name(env or 'ElbowArm-v0', elbows)}", seed) if shipped else Path(source)
+
+def read_policy(path: Path) -> Policy:
+    """The policy in a pair of files, named with or without either's suffix.
+
+    Raises:
+        ValueError: a file is missing, or they do not fit each other.
+    """
+    from safetensors.numpy import load_file  # pyright: ignore[reportUnknownVariableType]
+
     card_path, weights_path = pair(path)
     for needed in (card_path, weights_path):
         if not needed.is_file():
             raise ValueError(
-                f"policy must be one of {shipped_policies()} or the path of a pair of files, got no {needed}"
+                f"policy must be one of {baseline_names()} or the path of a pair of files, got no {needed}"
             )
     try:
-        plain = json.loads(card_path.read_text(encoding="utf-8"))
-        card = PolicyCard(**{**plain, "layers": tuple(plain["layers"]), "observation": tuple(plain["observation"])})
+        plain: dict[str, Any] = json.loads(card_path.read_text(encoding="utf-8"))
+        plain |= {name: tuple(plain[name]) for name in ("layers", "observation")}
+        card = PolicyCard(**plain)
     except (TypeError, KeyError, json.JSONDecodeError) as error:
         raise ValueError(f"policy card must hold the fields of PolicyCard, got {card_path}: {error}") from error
-    return Policy(card, load_file(weights_path))
+    return Policy(card, cast("Weights", load_file(weights_path)))
 
 
-def shipped_path(name: str, seed: int | None = None) -> Path:
-    """Where a shipped policy of this algorithm and task stands, of the best seed unless one is given.
-
-    Raises:
-        ValueError: none is shipped.
-    """
-    seeds = shipped_seeds(name)
-    if not seeds or seed not in (None, *seeds):
-        known = sorted({path.rpartition("_seed")[0] for path in shipped_policies()})
-        raise ValueError(
-            f"policy must be one of {known}, got {name!r}"
-            if not seeds
-            else f"seed of {name} must be one of {seeds}, got {seed}"
-        )
-
-    def merit(k: int) -> float:
-        card = json.loads((SHIPPED / f"{name}_seed{k}.json").read_text(encoding="utf-8"))
-        return float(card["evaluation"]["return"])
-
-    return SHIPPED / f"{name}_seed{max(seeds, key=merit) if seed is None else seed}"
+def baseline_names() -> list[str]:
+    """Names of the baselines without their training seeds, such as "ppo_elbows2"."""
+    return sorted(path.stem.rpartition("_seed")[0] for path in BASELINES.glob("*_seed*.json"))
 
 
-def shipped_seeds(name: str) -> list[int]:
-    """Training seeds of the shipped policies of an algorithm and task, such as "ppo_elbows2"."""
-    stems = [path.rpartition("_seed") for path in shipped_policies()]
-    return sorted(int(seed) for known, _, seed in stems if known == name)
+def baseline_path(name: str) -> Path:
+    """The baseline of an algorithm and task, such as "ppo_elbows2", without suffix. ValueError when there is none."""
+    found = sorted(BASELINES.glob(f"{name}_seed*.json"))
+    if not found:
+        raise ValueError(f"policy must be one of {baseline_names()}, got {name!r}")
+    return found[0].with_suffix("")
 
 
 def pair(path: Path) -> tuple[Path, Path]:
     """The card's and the weights' file of a policy named with or without either's suffix."""
     stem = path.with_suffix("") if path.suffix in (".json", ".safetensors") else path
     return stem.with_name(f"{stem.name}.json"), stem.with_name(f"{stem.name}.safetensors")
-
-
-def shipped_policies() -> list[str]:
-    """Names of the policies that come with the project, such as "ppo_elbows2_seed0"."""
-    return sorted(path.stem for path in SHIPPED.glob("*.json"))
-
-
-def policy_of(model: Any, settings: Settings, command: str, env: str = "ElbowArm-v0", **more: dict[str, Any]) -> Policy:
-    """The deterministic actor of an SB3 model (PPO's or SAC's kind) as a `Policy`.
-
-    Args:
-        model: with the `SB3VecEnv` that it was trained in.
-        settings: the environment's, JSON types only.
-        command: what made it.
-        env: the environment's id.
-        more: further fields of the card.
-    """
-    import torch
-
-    actor = played_layers(model)
-    linear = [layer for layer in actor if isinstance(layer, torch.nn.Linear)]
-    kinds = {type(layer).__name__.lower() for layer in actor} - {"linear"}
-    if len(kinds) != 1:
-        raise ValueError(f"the actor must have one kind of activation, got {sorted(kinds)}")
-    weights: Weights = {}
-    for k, layer in enumerate(linear):
-        weights[f"weight_{k}"] = layer.weight.detach().cpu().numpy().copy()
-        weights[f"bias_{k}"] = layer.bias.detach().cpu().numpy().copy()
-    card = PolicyCard(
-        algorithm=type(model).__name__.lower(),
-        environment=json.loads(json.dumps(settings.arguments)),
-        observation=tuple(model.get_env().get_attr("observation_names", 0)[0]),
-        layers=(linear[0].in_features, *(layer.out_features for layer in linear)),
-        activation=kinds.pop(),
-        command=command,
-        env=env,
-        output="tanh" if hasattr(model.policy, "actor") else "clip",
-        **{name: json.loads(json.dumps(value)) for name, value in more.items()},
-    )
-    return Policy(card, weights)
-
-
-def played_layers(model: Any) -> list[Any]:
-    """The torch layers from the observation to what an SB3 model of PPO's or SAC's kind does deterministically."""
-    return list(model.policy.average)[:-1] if hasattr(model.policy, "average") else actor_layers(model)
-
-
-def actor_layers(model: Any) -> list[Any]:
-    """The torch layers from the observation to the mean action of the actor that learns."""
-    if hasattr(model.policy, "actor"):
-        return [*model.policy.actor.latent_pi, model.policy.actor.mu]
-    return [*model.policy.mlp_extractor.policy_net, model.policy.action_net]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from elbow_gym.checks import positive
 from elbow_gym.env import ElbowArmEnv
 from elbow_gym.kinematics import inverse_kinematics
-from elbow_gym.parameters import positive
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 PAPER_KP = 500.0
@@ -28,7 +28,7 @@ class PDController:
     """v = kp (q_d - q) + kd (q_d_dot - q_dot) on every joint (eq. 27), in volts, then in the action's unit.
 
     q_d keeps the start pose but for joints 1, n-1 and n, which put the hand on the target (eq. 29); q_d_dot is its
-    exact derivative.
+    exact derivative. Stable where the environment reads it at 2 kHz (its arguments `CLIPPED`), not at 1 kHz.
 
     Args:
         env: the environment that it will act in, single or batched.
@@ -41,7 +41,7 @@ class PDController:
 
     def __init__(self, env: ElbowArmEnv | ElbowArmVectorEnv, kp: float = PAPER_KP, kd: float = PAPER_KD) -> None:
         self.kp, self.kd = positive("kp", kp), positive("kd", kd)
-        episodes = env.unwrapped.episodes
+        episodes = cast("ElbowArmEnv | ElbowArmVectorEnv", env.unwrapped).episodes
         # A drawn circle is another one in each episode.
         self._layout, self._circle = episodes.layout, episodes.targets if episodes.circle.random else episodes.circle
         self._arm, self._pose = episodes.arm, episodes.pose

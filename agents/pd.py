@@ -1,0 +1,7 @@
+"""The paper's PD controller, which lives in `elbow_gym.baselines.pd`."""
+
+from __future__ import annotations
+
+from elbow_gym.baselines.pd import PDController
+
+__all__ = ["PDController"]

@@ -1,0 +1,15 @@
+"""What the repository carries of trainings and solved problems: policies, optimal motions and learning curves.
+
+- `policies/`: ALGORITHM[_LABEL]_TASK_seedK.safetensors and .json, every training seed but the best of each algorithm
+  and task, which is the baseline in `elbow_gym/baselines/policies`. `python -m agents publish` writes both.
+- `optima/`: the motions that `python -m benchmarks optimal` found, .npz and what made them, .json.
+- `curves/`: evaluations of each policy's training, ALGORITHM[_LABEL]_TASK_seedK.csv.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+POLICIES = Path(__file__).parent / "policies"
+OPTIMA = Path(__file__).parent / "optima"
+CURVES = Path(__file__).parent / "curves"

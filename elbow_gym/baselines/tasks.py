@@ -1,0 +1,26 @@
+"""Short names of the registered environments and their elbow counts, as policies' files carry them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+ENVIRONMENTS = {"ElbowArm-v0": "elbows", "ElbowArmTable-v0": "table", "ElbowArmRandom-v0": "random"}
+"""Ids of the environments and what a task in them is called; the elbow count follows "elbows"."""
+
+
+def registered_arguments(env: str) -> dict[str, Any]:
+    """The arguments that an id stands for. Raises ValueError for an id that is not in `ENVIRONMENTS`."""
+    from gymnasium import spec
+
+    if env not in ENVIRONMENTS:
+        raise ValueError(f"env must be one of {list(ENVIRONMENTS)}, got {env!r}")
+    return dict(spec(env).kwargs)
+
+
+def task_name(env: str, elbows: int | None = None) -> str:
+    """Short name of a task: "elbows0", "elbows1", "elbows2", "table", "random"; others as "random_elbows1"."""
+    given = registered_arguments(env).get("elbows", 2)
+    count = given if elbows is None else elbows
+    if env == "ElbowArm-v0":
+        return f"elbows{count}"
+    return ENVIRONMENTS[env] if count == given else f"{ENVIRONMENTS[env]}_elbows{count}"

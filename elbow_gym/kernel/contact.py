@@ -1,0 +1,50 @@
+"""The compliant table under the end of a link, and the friction of gears."""
+
+# pyright: basic
+
+import numpy as np
+
+from elbow_gym.kernel.rows import GEAR_SPEED
+from elbow_gym.kernel.slots import (
+    CONTACT_N, CONTACT_R, CONTACT_T, COULOMB, DISSIPATION, FRICTION_SPEED, GEAR, LOSS, NEXT, PSI_DOT, Q_DOT, STIFFNESS,
+    TABLE_FRICTION, TWIST, Z_DOT,
+)  # fmt: skip
+from elbow_gym.kernel.template import template
+
+
+@template(inlined=True)
+def table_contact(ws, here, k, rho, rhod, z, zd):
+    """The compliant table's force on the end of a link, the torque about the yaw so far, and the power lost.
+
+    Reads: STIFFNESS, DISSIPATION, TABLE_FRICTION, FRICTION_SPEED, PSI_DOT, TWIST.
+    Writes: CONTACT_R, CONTACT_T, CONTACT_N, PSI_DOT, Z_DOT, TWIST, LOSS.
+    """
+    parent = here - NEXT
+    psid = ws[parent + PSI_DOT + k]
+    slide = rho * psid
+    speed = ws[here + FRICTION_SPEED + k]
+    spring = ws[here + STIFFNESS + k] * max(-z, 0.0)
+    normal = max(spring * (1.0 - ws[here + DISSIPATION + k] * zd), 0.0)
+    drag = -ws[here + TABLE_FRICTION + k] * normal / np.sqrt(rhod * rhod + slide * slide + speed * speed)
+    radial = drag * rhod
+    tangential = drag * slide
+    ws[here + PSI_DOT + k] = psid
+    ws[here + Z_DOT + k] = zd
+    ws[here + CONTACT_R + k] = radial
+    ws[here + CONTACT_T + k] = tangential
+    ws[here + CONTACT_N + k] = normal
+    ws[here + TWIST + k] = ws[parent + TWIST + k] + rho * tangential
+    ws[here + LOSS + k] = (spring - normal) * zd - (radial * rhod + tangential * slide)
+
+
+@template(inlined=True)
+def gear_friction(ws, here, k):
+    """Torque of the gear's Coulomb friction along the joint's motion.
+
+    Reads: Q_DOT, COULOMB.
+    Writes: GEAR.
+    """
+    q_dot = ws[here + Q_DOT + k]
+    torque = ws[here + COULOMB + k] * q_dot / np.sqrt(q_dot * q_dot + GEAR_SPEED * GEAR_SPEED)
+    ws[here + GEAR + k] = torque
+    return torque

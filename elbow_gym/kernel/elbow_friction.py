@@ -1,0 +1,140 @@
+"""Friction under rigid elbows, and elbow forces that agree with it."""
+
+# pyright: basic
+
+import numpy as np
+
+from elbow_gym.kernel.dense import cholesky_solve, gauss_solve
+from elbow_gym.kernel.rows import ELBOW_SPEED, MAXIMUM_ELBOWS
+from elbow_gym.kernel.slots import (
+    C3, COUPLING, CR, CZ, D, ELBOW_FRICTION, ER, EZ, FORCES, FREE_RISE, IR3, IZ3, LANES, LOSS, MATRIX, NEXT, PUSH,
+    PUSHING, Q_DOT, R, RHO, RHO_DOT, ROTOR, SLIDE_R, SLIDE_T, STRIDE, TABLE, TWIST, U, W, X, Y,
+)  # fmt: skip
+from elbow_gym.kernel.template import template
+
+
+@template
+def friction_response(ws, shared, lanes, elbow, j):
+    """Friction per projection_step of an elbow's force, and x, the recursion's answer to its radial part.
+
+    Reads: Q_DOT, ROTOR, RHO, RHO_DOT, ER, EZ, D, ELBOW_FRICTION, IR3, IZ3, CR, CZ, C3.
+    Writes: CR, CZ, C3, X, SLIDE_R, SLIDE_T.
+    """
+    here = U((elbow - 2) * STRIDE)
+    child = here + NEXT
+    for k in range(lanes):
+        radial = ws[here + RHO_DOT + k]
+        tangential = ws[here + RHO + k] * ws[Q_DOT + k]
+        speed = np.sqrt(radial * radial + tangential * tangential + ELBOW_SPEED * ELBOW_SPEED)
+        share = -ws[here + ELBOW_FRICTION + k] / speed
+        shared[SLIDE_R + U(j * W) + k] = share * radial
+        shared[SLIDE_T + U(j * W) + k] = share * tangential
+        ws[child + CR + k] = -share * radial
+        ws[child + CZ + k] = 0.0
+        ws[child + C3 + k] = 0.0
+    for a in range(elbow - 2, 0, -1):
+        here = U(a * STRIDE)
+        child = here + NEXT
+        for k in range(LANES):
+            cr = ws[child + CR + k]
+            cz = ws[child + CZ + k]
+            x = -((ws[here + ER + k] * cr + ws[here + EZ + k] * cz) + ws[child + C3 + k])
+            dx = ws[here + D + k] * x
+            ws[here + CR + k] = cr + dx * ws[here + IR3 + k]
+            ws[here + CZ + k] = cz + dx * ws[here + IZ3 + k]
+            ws[here + C3 + k] = -ws[here + ROTOR + k] * dx
+            ws[here + U(X + j * W) + k] = x
+
+
+@template
+def friction_coupling(ws, shared, lanes, elbows):
+    """Keeps the matrix and the free accelerations, and finds what friction adds: the rise at i for a newton on j.
+
+    Reads: D, Y, X, FORCES, COUPLING.
+    Writes: MATRIX, COUPLING, FREE_RISE.
+    """
+    p = elbows.size
+    for j in range(p):
+        friction_response(ws, shared, lanes, elbows[j], j)
+    for j in range(p):
+        for k in range(lanes):
+            shared[FREE_RISE + U(j * W) + k] = shared[FORCES + U(j * W) + k]
+        for i in range(p):
+            entry = U((i * MAXIMUM_ELBOWS + j) * W)
+            symmetric = U((max(i, j) * MAXIMUM_ELBOWS + min(i, j)) * W)
+            for k in range(lanes):
+                shared[MATRIX + entry + k] = shared[symmetric + k]
+                shared[COUPLING + entry + k] = 0.0
+            for a in range(1, min(elbows[i], elbows[j]) - 1):
+                here = U(a * STRIDE)
+                for k in range(lanes):
+                    answer = ws[here + U(Y + i * W) + k]
+                    shared[COUPLING + entry + k] += ws[here + D + k] * answer * ws[here + U(X + j * W) + k]
+
+
+@template
+def apply_friction(ws, shared, lanes, tip, elbows):
+    """Puts the friction that was found on the arm and its loss on the meter; what is left to solve is the forces.
+
+    Reads: Q_DOT, RHO, RHO_DOT, TWIST, LOSS, R, X, FORCES, MATRIX, COUPLING, FREE_RISE, SLIDE_R, SLIDE_T, PUSH.
+    Writes: TWIST, LOSS, R, FORCES, PUSH.
+    """
+    p = elbows.size
+    for j in range(p):
+        for k in range(lanes):
+            shared[PUSH + U(j * W) + k] = max(shared[FORCES + U(j * W) + k], 0.0)
+    for i in range(p):
+        for k in range(lanes):
+            shared[FORCES + U(i * W) + k] = shared[FREE_RISE + U(i * W) + k]
+        for j in range(p):
+            entry = U((i * MAXIMUM_ELBOWS + j) * W)
+            for k in range(lanes):
+                shared[entry + k] = shared[MATRIX + entry + k]
+                shared[FORCES + U(i * W) + k] += shared[COUPLING + entry + k] * shared[PUSH + U(j * W) + k]
+    for j in range(p):
+        x_slot = U(X + j * W)
+        push = PUSH + U(j * W)
+        for a in range(1, elbows[j] - 1):
+            here = U(a * STRIDE)
+            for k in range(lanes):
+                ws[here + R + k] += ws[here + x_slot + k] * shared[push + k]
+        here = U((elbows[j] - 2) * STRIDE)
+        for k in range(lanes):
+            radial = shared[SLIDE_R + U(j * W) + k] * shared[push + k]
+            tangential = shared[SLIDE_T + U(j * W) + k] * shared[push + k]
+            lost = -(radial * ws[here + RHO_DOT + k] + tangential * ws[here + RHO + k] * ws[Q_DOT + k])
+            ws[here + LOSS + k] = ws[here + LOSS + k] + lost if TABLE else lost
+            ws[tip + TWIST + k] += tangential * ws[here + RHO + k]
+
+
+@template
+def friction_fixed_point(ws, shared, n, elbows):
+    """Friction of the elbows that push, and elbow forces that agree with it.
+
+    Friction enters the columns of the active elbows, at first those that push without friction, then those that push
+    with it, until they stay the same; the friction found is then held, so that it opposes the sliding in any case.
+
+    Reads: FORCES, PUSHING.
+    Writes: TWIST, PUSHING.
+    """
+    lanes = min(LANES, U(ws.size))
+    p = elbows.size
+    tip = U((n - 1) * STRIDE)
+    if not TABLE:
+        for k in range(lanes):
+            ws[tip + TWIST + k] = 0.0
+    friction_coupling(ws, shared, lanes, elbows)
+    cholesky_solve(shared, lanes, p)
+    for _ in range(p + 2):
+        for j in range(p):
+            for k in range(lanes):
+                shared[PUSHING + U(j * W) + k] = 1.0 if shared[FORCES + U(j * W) + k] > 0.0 else 0.0
+        gauss_solve(shared, lanes, p)
+        changed = 0.0
+        for j in range(p):
+            for k in range(lanes):
+                pushes = 1.0 if shared[FORCES + U(j * W) + k] > 0.0 else 0.0
+                changed = max(changed, abs(pushes - shared[PUSHING + U(j * W) + k]))
+        if changed == 0.0:
+            break
+    apply_friction(ws, shared, lanes, tip, elbows)

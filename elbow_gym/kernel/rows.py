@@ -1,0 +1,68 @@
+"""Rows of the public arrays that go in and out of the kernel, and the numbers its physics rests on. No Numba here."""
+
+# Rows of a block's public arrays: state (B, STATE_ROWS, n) and parameters (B, PARAMETER_ROWS, n).
+STATE = ("q", "q_dot", "current", "electrical_energy", "drawn_energy", "copper_loss", "friction_loss", "link_work")
+STATE_ROWS = len(STATE)
+# Behind them, in arrays for a kernel with a switch on: per joint or, for contacts, per contact point at the link's end;
+# the supply's loss stands with joint 1.
+SWITCHED_STATE = (
+    "contact_loss", "temperature_rise", "supply_loss", "contact_radial", "contact_tangential", "contact_normal",
+)  # fmt: skip
+SWITCHED_STATE_ROWS = STATE_ROWS + len(SWITCHED_STATE)
+PARAMETERS = (
+    "length",
+    "mass",
+    "end_inertia",  # transverse inertia about the joint: I_t + m l^2 / 4
+    "inertia_difference",  # I_t - I_s
+    "axial_inertia",  # I_s
+    "reflected_inertia",  # J_m
+    "joint_torque_constant",  # K_m
+    "friction",  # D + D_m
+    "reflected_viscous_friction",  # D_m
+    "armature_resistance",  # R
+    "inverse_inductance",  # 1 / L
+    "gravity",  # g, the same in every entry
+    "payload",  # mass at the hand, the same in every entry
+    # From here on only kernels with a switch on look.
+    "stiffness",  # k of the table
+    "dissipation",  # c
+    "table_friction",  # mu
+    "friction_velocity",  # v_s
+    "elbow_friction",  # mu_e of the rigid elbows
+    "reflected_coulomb_friction",  # T_c k
+    "heating",  # 1 / C_th
+    "cooling",  # 1 / (R_th C_th)
+    "temperature_coefficient",  # alpha, or 0 while windings are not followed
+    "sag",  # R_s / V0^2
+    "bus_floor",  # least V0 CURRENT that the supply takes: 0, or far below without bound
+)
+PLAIN_PARAMETER_ROWS = 13
+PARAMETER_ROWS = len(PARAMETERS)
+# Columns of the per-arm summary (B, SUMMARY_COLUMNS + p): hand position, lowest joint or hand height, seconds spent
+# below the table (accumulated), 1 while the state is representable, then one force per elbow.
+HAND, LOWEST, BELOW_TABLE, VALID, SUMMARY_COLUMNS = 0, 3, 4, 5, 6
+# Rows that `observe` fills beside the observation.
+FIGURES = (
+    "tracking_error",
+    "electrical_power",
+    "electrical_energy",
+    "drawn_energy",
+    "link_work",
+    "reward_tracking",
+    "reward_energy",
+    "below_table",
+    "reward",
+)
+# Beyond this angle [rad] the sine loses digits; an arm gets there only by blowing up.
+LARGEST_ANGLE = 1e5
+# Elbows rest at z = 0 to 1e-8 m; lower than this is under the table.
+BELOW_TABLE_TOLERANCE = 1e-6
+# A compliant table gives way: what touches it is under it from here on.
+CONTACT_TOLERANCE = 1e-3
+# Speeds over which friction of rigid elbows [m/s] and of gears [rad/s] comes up.
+ELBOW_SPEED = 0.01
+GEAR_SPEED = 0.05
+MAXIMUM_ELBOWS = 8
+# A projection onto the table is repeated while it turns a link by more than this [rad per m of it], so often at most.
+SMALL_SHIFT = 1e-7
+NEWTON_STEPS = 30

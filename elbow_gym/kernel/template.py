@@ -1,0 +1,94 @@
+"""Templates: functions that every kernel gets its own compiled copy of."""
+
+import hashlib
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+from types import FunctionType
+from typing import Any, NamedTuple
+
+from numba import njit
+
+Entry = Callable[..., Any]
+"""A compiled function."""
+
+
+class Template(NamedTuple):
+    """A function and how it is compiled."""
+
+    function: Any
+    inlined: bool
+    """Into every caller."""
+    entry: bool
+    """Called from Python, and cached on disk with all that it calls."""
+
+
+TEMPLATES: dict[str, Template] = {}
+"""Every template by its name."""
+
+
+def template(function: Any = None, *, inlined: bool = False, entry: bool = False) -> Any:
+    """Decorator that marks a function as a template, and leaves the function itself as it is.
+
+    Args:
+        function: the function; None where the decorator has arguments.
+        inlined: compile it into every caller.
+        entry: Python calls it; it is cached on disk.
+    """
+    if function is None:
+        return partial(template, inlined=inlined, entry=entry)
+    TEMPLATES[function.__name__] = Template(function, inlined, entry)
+    return function
+
+
+def compiled(function: Any, *, cached: bool = False, inlined: bool = False) -> Any:
+    """The compiled function, without a cache on disk where no folder can be written."""
+    try:
+        return njit(nogil=True, error_model="numpy", cache=cached, forceinline=inlined)(function)
+    except RuntimeError:
+        return njit(nogil=True, error_model="numpy", forceinline=inlined)(function)
+
+
+def compiled_entry(function: Any) -> Any:
+    """A function of its own that Python calls, cached on disk under a name with the digest of the sources."""
+    names: dict[str, Any] = function.__globals__
+    return compiled(renamed(function, names, f"{function.__name__}_{sources()}"), cached=True)
+
+
+@cache
+def sources() -> str:
+    """Digest of all files of the kernel.
+
+    It is part of the name of everything cached on disk: Numba's cache compares the file of an entry alone, and would
+    take an entry whose callee in another file has changed for current.
+    """
+    texts = (path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
+    return hashlib.sha256(b"".join(texts)).hexdigest()[:10]
+
+
+def instances(known: dict[str, Any], suffix: str, compile_with: Entry = compiled) -> dict[str, Entry]:
+    """The entries by name: all templates copied, with other values for the names that they were written with.
+
+    Closures would do the same, but Numba's disk cache never recognises a closure over compiled functions.
+
+    Args:
+        known: values by name, in place of the globals of the templates' files.
+        suffix: added to the names of the copies.
+        compile_with: `compiled`, or a function of the same form that leaves them interpreted.
+    """
+    space: dict[str, Any] = {}
+    for each in TEMPLATES.values():
+        space.update(each.function.__globals__)
+    space.update(known)
+    for name, each in TEMPLATES.items():
+        copy = renamed(each.function, space, f"{name}_{suffix}")
+        space[name] = compile_with(copy, cached=each.entry, inlined=each.inlined)
+    return {name: space[name] for name, each in TEMPLATES.items() if each.entry}
+
+
+def renamed(function: FunctionType, names: dict[str, Any], name: str) -> FunctionType:
+    """A copy of a function with other globals and another name."""
+    copy = FunctionType(function.__code__, names, name)
+    copy.__qualname__ = name
+    copy.__doc__ = function.__doc__
+    return copy

@@ -1,0 +1,126 @@
+"""Observations of B arms at an instant: the state's and switched-on features, noise, and the figures for infos."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from elbow_gym.kernel import observe
+from elbow_gym.kernel.rows import FIGURES
+from elbow_gym.parameters import Array
+from elbow_gym.simulator import Simulator
+from elbow_gym.task.arm_batch import Population
+from elbow_gym.task.observation import ObservationLayout
+from elbow_gym.task.reward import Price
+from elbow_gym.task.settings import Settings
+from elbow_gym.task.targets import Target
+
+
+class Sight(NamedTuple):
+    """What is seen of B arms at an instant, and what the control step that ends there is paid."""
+
+    observation: NDArray[np.float32]
+    """(B, size), scaled and saturated."""
+    figures: Array
+    """Rows of `FIGURES`: energies [J] and time under the table [s] since the reset, summed over the joints."""
+
+    def figure(self, name: str) -> Array:
+        """A row of the figures by name, (B,)."""
+        return self.figures[FIGURES.index(name)]
+
+
+def looking(
+    layout: ObservationLayout, simulator: Simulator, pose: Array, target: Target, price: Price, spent: Array
+) -> tuple[Sight, Callable[[int, int], None]]:
+    """A sight still empty, and the function that fills its rows of arms first..end-1 when they have moved.
+
+    Args:
+        layout: the observation's entries.
+        simulator: the arms.
+        pose: what joint angles are counted from [rad], (n,).
+        target: what the hands should follow.
+        price: the reward's terms are -tracking_weight |hand - target| and -energy_weight P.
+        spent: energy paid before this control step [J], (B,), brought up to date.
+    """
+    arms = simulator.num_envs
+    sight = Sight(np.empty((arms, layout.size), np.float32), np.empty((len(FIGURES), arms)))
+
+    def look(first: int, end: int) -> None:
+        observe.observe(
+            *simulator.raw, pose, *target, layout.scale, layout.high, tuple(price), spent, *sight, first, end
+        )
+
+    return sight, look
+
+
+class Sensing:
+    """What switched-on features add to the observations and infos of B arms, and the sensors' noise.
+
+    Args:
+        settings: the environment's arguments.
+        simulator: the arms.
+        population: their parameters.
+        queue: voltages asked for, newest first [V], (B, 1 + longest delay, n).
+    """
+
+    def __init__(self, settings: Settings, simulator: Simulator, population: Population, queue: Array) -> None:
+        self._settings, self._simulator, self._population, self._queue = settings, simulator, population, queue
+        n = simulator.arm.n_joints
+        self._limits = simulator.arm.of_motors("temperature_limit")
+        self._generators: list[np.random.Generator] = []
+        self._noisy = False
+        sizes = {
+            "contact_force": n - 1 if settings.conditions.surface is not None else 0,
+            "temperature_rise": n if settings.heat else 0,
+            "pending_voltage": n * (queue.shape[1] - 1),
+        }
+        self._switched = [name for name, size in sizes.items() if size]
+        self.layout = ObservationLayout(n, sizes)
+        """The observation's entries, those of the switched-on features included."""
+
+    def set_noise(self, chosen: NDArray[np.int64], generators: Sequence[np.random.Generator]) -> None:
+        """The chosen arms' noise comes from these generators and is as strong as their values say from now on."""
+        if not self._generators:
+            self._generators = [np.random.default_rng(0)] * self._simulator.num_envs
+        for i, generator in zip(chosen, generators, strict=True):
+            self._generators[int(i)] = generator
+        self._noisy = bool(self._population.values["sensor_noise"].any())
+
+    def complete(self, observation: NDArray[np.float32], resting: NDArray[np.bool_] | None) -> None:
+        """Fills the switched-on features of observations (B, size), and adds noise for arms that do not rest."""
+        layout = self.layout
+        for name in self._switched:
+            where = layout.slices[name]
+            values = self._quantity(name).reshape(len(observation), -1) / layout.scale[where]
+            observation[:, where] = np.clip(values, -layout.high[where], layout.high[where])
+        if not self._noisy:
+            return
+        noise = self._population.values["sensor_noise"]
+        noisy = int(layout.slices["target_angle"].start)
+        for i in np.flatnonzero(noise > 0.0 if resting is None else (noise > 0.0) & ~resting):
+            heard = observation[i, :noisy] + float(noise[i]) * self._generators[int(i)].standard_normal(noisy)
+            observation[i, :noisy] = np.clip(heard, -layout.high[:noisy], layout.high[:noisy])
+
+    def _quantity(self, name: str) -> Array:
+        if name == "contact_force":
+            return self._simulator.contact_force[..., 2]
+        return self._simulator.temperature_rise if name == "temperature_rise" else self._queue[:, :-1]
+
+    def info(self) -> dict[str, Any]:
+        """Fresh arrays of what the switched-on features add, one row per arm."""
+        simulator, settings = self._simulator, self._settings
+        info: dict[str, Any] = {}
+        if "contact_force" in self._switched:
+            info["contact_force"] = simulator.contact_force
+            info["load_bearing"] = info["contact_force"][..., 2] > 0.0
+        if "contact_force" in self._switched or settings.elbow_friction > 0.0:
+            info["contact_loss"] = simulator.contact_loss.sum(axis=1)
+        if settings.heat:
+            info["temperature_rise"] = simulator.temperature_rise.copy()
+            info["overheated"] = (simulator.temperature_rise > self._limits).any(axis=1)
+        if settings.supply_resistance > 0.0:
+            info["supply_loss"] = simulator.supply_loss.copy()
+        return info
