@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import io
 import json
+import os
 import re
 import sys
 import textwrap
@@ -63,12 +64,20 @@ class Commands:
             words: the command line after the program's name; that of this process when None.
 
         Raises:
-            SystemExit: 0 after help, 2 if the words cannot be parsed, 1 if the command refused what they say.
+            SystemExit: 0 after help, 2 if the words cannot be parsed, 1 if the command refused what they say, or if
+                nobody reads the output to its end, as in `python -m agents --help | head -1`.
         """
         try:
-            self.parse(sys.argv[1:] if words is None else words)()
+            try:
+                self.parse(sys.argv[1:] if words is None else words)()
+            finally:
+                sys.stdout.flush()
         except SystemExit:
             raise
+        except BrokenPipeError:
+            if _has_reader():
+                raise
+            sys.exit(1)
         except _users_errors() as error:
             sys.exit(f"error: {error}")
 
@@ -150,6 +159,19 @@ def one_line(box: str) -> str:
 def _refuse(reason: str) -> NoReturn:
     print(f"error: {reason}", file=sys.stderr)
     sys.exit(2)
+
+
+def _has_reader() -> bool:
+    """Whether stdout is read, found out by ending the line; if not, the rest of the output is dropped."""
+    try:
+        print(flush=True)
+    except BrokenPipeError:
+        # Python flushes once more at its end, and would print a traceback.
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+        return False
+    return True
 
 
 def _users_errors() -> tuple[type[Exception], ...]:

@@ -131,6 +131,48 @@ def test_line_is_plain_on_a_coloured_terminal():
     assert ran.stderr == b"error: --seeds must be a positive integer, got 0; see python -m agents train --help\n"
 
 
+SAYING = """
+from agents.cli import Commands
+app = Commands("program", "What it is for.")
+@app.command
+def say(lines: int) -> None:
+    for line in range(lines):
+        print(line)
+app.run()
+"""
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["-m", "agents", "--help"],
+        ["-m", "agents", "train", "ppo", "--help"],
+        ["-c", SAYING, "say", "--lines", "1"],
+        ["-c", SAYING, "say", "--lines", "100000"],
+    ],
+    ids=["programs-help", "commands-help", "line", "lines"],
+)
+def test_output_that_nobody_reads_ends_without_a_traceback(words, unbuffered):
+    reader, writer = os.pipe()
+    os.close(reader)
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    command = [sys.executable, *words]
+    ran = subprocess.run(command, cwd=ROOT, env=environment, stdout=writer, stderr=subprocess.PIPE, check=False)
+    os.close(writer)
+    assert (ran.returncode, ran.stderr) == (1, b"")
+
+
+def test_broken_pipe_of_something_else_is_not_hidden(app, capsys):
+    @app.command
+    def film() -> None:
+        """Writes into a pipe that nobody reads."""
+        raise BrokenPipeError("film")
+
+    with pytest.raises(BrokenPipeError, match="film"):
+        app.run(["film"])
+
+
 def said_by(*words):
     environment = {**os.environ, "PYTHONUTF8": "1", "COLUMNS": "80"}
     command = [sys.executable, *words]
