@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from hypothesis import given
-from strategies import cases
-from test_equivalence import assert_close, fast
 
 from agents.control.inverse_dynamics import InverseDynamics
 from elbow_gym import Simulator, dynamics, kinematics
+from tests.laws.test_equivalence import assert_close, fast
+from tests.support.strategies import cases
 
 ELBOWS = [(), (4,), (4, 7)]
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from strategies import cases
 
 from elbow_gym import ArmParameters, LinkParameters, MotorParameters, dynamics, kinematics
+from tests.support.strategies import cases
 
-VECTORS = np.load(Path(__file__).parent / "vectors" / "forward_dynamics_vectors.npz")
+VECTORS = np.load(Path(__file__).parents[1] / "vectors" / "forward_dynamics_vectors.npz")
 ELBOWS = {0: (), 1: (4,), 2: (4, 7)}
 NUDGE = 1e-5
 

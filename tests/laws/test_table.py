@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from test_contact import lying, small_arm
-from test_laws import inductor_energy, mechanical_energy, uneven_arm
 
 from elbow_gym import MotorParameters, Simulator, TableParameters, contact, dynamics, kinematics, paper_arm
+from tests.elbow_gym.test_contact import lying, small_arm
+from tests.laws.test_energy import inductor_energy, mechanical_energy, uneven_arm
 
 ROUGH, SMOOTH = {"friction": 0.3}, {"friction": 0.0}
 DRIVE = {"heat": True, "supply_resistance": 0.2}

@@ -7,10 +7,10 @@ from dataclasses import FrozenInstanceError, fields, replace
 import numpy as np
 import pytest
 from hypothesis import given
-from strategies import arms
 
 from elbow_gym import ArmParameters, LinkParameters, MotorParameters, paper_arm
 from elbow_gym.parameters import as_arm, as_elbows
+from tests.support.strategies import arms
 
 MAY_BE_ZERO = ["gear_viscous_friction", "gear_coulomb_friction", "temperature_coefficient"]
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from strategies import cases
 
 from elbow_gym import Simulator, dynamics, kinematics
+from tests.support.strategies import cases
 
 mujoco = pytest.importorskip("mujoco")
 

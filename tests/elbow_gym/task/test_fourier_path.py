@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import between
 
 from elbow_gym import Circle, paper_arm
 from elbow_gym.task.circle import check_reachable
 from elbow_gym.task.fourier_path import path_rate, points_path
+from tests.support.strategies import between
 
 CORNERS = [(1.4, 1.4, 0.3), (1.6, 1.4, 0.4), (1.6, 1.6, 0.5), (1.4, 1.6, 0.4)]
 # Points of a path [m].

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import between
 
 from elbow_gym import ArmParameters, Circle, LinkParameters, MotorParameters, paper_arm
 from elbow_gym.task.circle import PLANES, check_reachable
 from elbow_gym.task.reach import reach_shortfall
+from tests.support.strategies import between
 
 EVERYTHING = {
     "center": [[1.2, 1.4], 1.3, [0.3, 0.6]],

@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 import pygame
 import pytest
-from make_golden import GOLDEN, picture
 from PIL import Image
 
 from elbow_gym import ElbowArmEnv, paper_arm
@@ -16,6 +15,7 @@ from elbow_gym.rendering.painter import ELBOW, INK, PULL, PUSH, TRACE
 from elbow_gym.rendering.scene import cut_at_table
 from elbow_gym.rendering.viewer import Viewer
 from elbow_gym.task.circle import Circle
+from tests.make_golden import GOLDEN, picture
 
 SIZES = [(640, 480), (1280, 720), (320, 240)]
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from make_golden import ELBOWS, GOLDEN, trace
+
+from tests.make_golden import ELBOWS, GOLDEN, trace
 
 
 @pytest.mark.parametrize("elbows", ELBOWS)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from scipy.integrate import solve_ivp
-from strategies import between, cases
 
 from elbow_gym import (
     ArmParameters,
@@ -18,6 +17,7 @@ from elbow_gym import (
     kinematics,
     motors,
 )
+from tests.support.strategies import between, cases
 
 NUDGE = 1e-6
 ROUGH = TableParameters(stiffness=2e3, dissipation=0.8, friction=0.6, friction_velocity=0.02)

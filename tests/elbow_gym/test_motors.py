@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from scipy.integrate import solve_ivp
-from strategies import between, vectors
 
 from elbow_gym import dynamics, motors, paper_arm
+from tests.support.strategies import between, vectors
 
 
 def with_motors(arm, **change):

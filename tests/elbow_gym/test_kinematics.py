@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import between, cases
 
 from elbow_gym import LinkParameters, kinematics
+from tests.support.strategies import between, cases
 
 NUDGE = 1e-6
 # Of a point on the paper's circle: angle along it [rad].

@@ -15,8 +15,8 @@ from elbow_gym import kernel, kinematics, paper_arm
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 
-HERE = Path(__file__).parent
-VECTORS = np.load(HERE / "vectors" / "forward_dynamics_vectors.npz")
+ROOT = Path(__file__).parents[3]
+VECTORS = np.load(ROOT / "tests" / "vectors" / "forward_dynamics_vectors.npz")
 ELBOWS = (4, 7)
 
 
@@ -97,10 +97,10 @@ def test_lane_count_and_batch_size_change_no_bit_of_a_run(size):
 
 
 def test_an_uncompiled_kernel_of_odd_width_gives_the_same_bits():
-    script = "import test_kernel; print(test_kernel.advanced(3, 4, n_steps=2).tobytes().hex())"
+    script = "from tests.elbow_gym.kernel.test_kernel import advanced; print(advanced(3, 4, n_steps=2).tobytes().hex())"
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     run = [sys.executable, "-W", "error", "-c", script]
-    done = subprocess.run(run, cwd=HERE, env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run(run, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == advanced(1, 4, n_steps=2).tobytes().hex()
 
 

@@ -9,7 +9,6 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from browser import chromium, emulate, keep_picture
 
 from agents.evaluation.metrics import metrics
 from agents.evaluation.players import CLASSICAL
@@ -25,6 +24,7 @@ from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, ELBOW_COLOURS
 from benchmarks.energy import pareto
 from elbow_gym.kinematics import joint_positions
 from elbow_gym.task.circle import Circle
+from tests.support.browser import chromium, emulate, keep_picture
 
 
 def synthetic(elbows, start):

@@ -91,7 +91,7 @@ import os, signal, sys
 from pathlib import Path
 from agents.learning.callback import Keeper
 from agents.learning.train import train
-from tests.test_train import SAC_KILLED, small_run
+from tests.agents.learning.test_train import SAC_KILLED, small_run
 
 def die(self):
     if self.num_timesteps > 600:
@@ -106,7 +106,7 @@ train(small_run(Path(sys.argv[1]), checkpoint_seconds=0.0, **changes))
 
 def kill(folder, algorithm):
     command = [sys.executable, "-c", KILLED, str(folder), algorithm]
-    killed = subprocess.run(command, cwd=Path(__file__).parent.parent, capture_output=True, check=False)
+    killed = subprocess.run(command, cwd=Path(__file__).parents[3], capture_output=True, check=False)
     assert killed.returncode == -signal.SIGKILL, killed.stderr
 
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 from hypothesis import assume, given, settings
-from strategies import between, cases
-from test_kernel import accelerations, states
 
 from elbow_gym import LinkParameters, dynamics
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
+from tests.elbow_gym.kernel.test_kernel import accelerations, states
+from tests.support.strategies import between, cases
 
 # Where the linear systems are worse conditioned than this, rounding alone exceeds the tolerance.
 WORST_CONDITION = 1e7

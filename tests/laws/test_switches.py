@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import between, cases
-from test_equivalence import assert_close, assume_solvable
-from test_kernel import accelerations
 
 from elbow_gym import dynamics, kernel, motors
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.table import FRICTION_VELOCITY, TableParameters
+from tests.elbow_gym.kernel.test_kernel import accelerations
+from tests.laws.test_equivalence import assert_close, assume_solvable
+from tests.support.strategies import between, cases
 
 SWITCHES = [
     {"table": True},
