@@ -8,36 +8,17 @@ from hypothesis import assume, given
 from scipy.integrate import solve_ivp
 
 from elbow_gym import (
-    ArmParameters,
-    LinkParameters,
-    MotorParameters,
     TableParameters,
     contact,
     dynamics,
     kinematics,
     motors,
 )
+from tests.support.arms import lying, small_arm
 from tests.support.strategies import between, cases
 
 NUDGE = 1e-6
 ROUGH = TableParameters(stiffness=2e3, dissipation=0.8, friction=0.6, friction_velocity=0.02)
-
-
-def small_arm(**motor):
-    """Two unequal links behind the yaw, with friction in joints and gears."""
-    return ArmParameters(
-        links=(LinkParameters(length=0.0), LinkParameters(mass=0.4, length=0.5), LinkParameters(mass=0.2, length=0.3)),
-        motors=(MotorParameters(**motor),) * 3,
-        joint_viscous_friction=(0.05, 0.03, 0.02),
-        nominal_pose=(0.0, 1.0, 1.0),
-    )
-
-
-def lying(arm, joint_height, hand_height):
-    """Pose of the small arm with joint 3 and the hand at the given heights."""
-    (_, upper), (_, fore) = ((link.mass, link.length) for link in arm.links[1:])
-    first, second = np.arccos(joint_height / upper), np.arccos((hand_height - joint_height) / fore)
-    return np.array([0.3, first, second - first])
 
 
 def point_velocities(arm, q, q_dot):

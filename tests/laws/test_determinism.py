@@ -1,49 +1,23 @@
-"""Run as a script, it prints the hashes of a rollout with a single and with a batched environment."""
+"""A seed makes the rollout: fresh processes, caches and threads change no bit of it."""
 
-import hashlib
 import os
 import subprocess
 import sys
+from pathlib import Path
 
-import numpy as np
 import pytest
 
-from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv
+from tests.support.rollouts import batch, single
 
-SETTINGS = {"circle": {"phase": "random"}, "duration": 0.5}
-
-
-def actions(seed, num_envs):
-    return np.random.default_rng(seed).uniform(-1.0, 1.0, (40, num_envs, 10)).astype(np.float32)
-
-
-def single(seed):
-    """Hash of two episodes of one arm."""
-    env = ElbowArmEnv(**SETTINGS)
-    digest = hashlib.sha256(env.reset(seed=seed)[0].tobytes())
-    for action in actions(seed, 1)[:, 0]:
-        observation, reward, _, truncated, info = env.step(action)
-        digest.update(observation.tobytes() + np.array([reward, info["electrical_energy"]]).tobytes())
-        if truncated:
-            digest.update(env.reset()[0].tobytes())
-    return digest.hexdigest()
-
-
-def batch(seed, num_envs=20, num_threads=1):
-    """Hash of two episodes of a batch."""
-    env = ElbowArmVectorEnv(num_envs, autoreset_mode="SameStep", num_threads=num_threads, **SETTINGS)
-    digest = hashlib.sha256(env.reset(seed=seed)[0].tobytes())
-    for action in actions(seed, num_envs):
-        observation, reward, *_, info = env.step(action)
-        digest.update(observation.tobytes() + reward.tobytes() + info["electrical_energy"].tobytes())
-    return digest.hexdigest()
+ROOT = Path(__file__).parents[2]
 
 
 def elsewhere(cache):
     """The hashes from a fresh process with its own Numba cache and string hashing, and how many files the cache has."""
     surroundings = {key: value for key, value in os.environ.items() if key != "PYTHONHASHSEED"}
     ran = subprocess.run(
-        [sys.executable, __file__],
+        [sys.executable, "-m", "tests.support.rollouts"],
+        cwd=ROOT,
         env={**surroundings, "NUMBA_CACHE_DIR": str(cache)},
         check=True,
         capture_output=True,
@@ -79,7 +53,3 @@ def test_seed_makes_the_rollout(rollout):
 @pytest.mark.parametrize("num_threads", [2, 3, 8])
 def test_threads_do_not_change_a_bit(num_threads):
     assert batch(0, num_envs=70, num_threads=num_threads) == batch(0, num_envs=70)
-
-
-if __name__ == "__main__":
-    print(single(0), batch(0))

@@ -1,35 +1,12 @@
 """The compiled recursion equals the paper's equations, derived another way, on any arm of the family."""
 
 import numpy as np
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 
 from elbow_gym import LinkParameters, dynamics
-from elbow_gym.simulation.options import Conditions
-from elbow_gym.simulation.parameter_rows import parameter_table
-from tests.elbow_gym.kernel.test_kernel import accelerations, states
+from tests.support.comparisons import assert_close, assume_solvable
+from tests.support.kernel_calls import accelerations_of
 from tests.support.strategies import between, cases
-
-# Where the linear systems are worse conditioned than this, rounding alone exceeds the tolerance.
-WORST_CONDITION = 1e7
-
-
-def assert_close(value, expected, relative):
-    np.testing.assert_allclose(value, expected, rtol=0.0, atol=relative * max(1.0, np.abs(expected).max(initial=0.0)))
-
-
-def fast(case, payload=0.0):
-    """The kernel's accelerations, elbow forces and current rates of one arm."""
-    state = states(case.q[None], case.q_dot[None], case.current[None])
-    table = parameter_table(case.arm, Conditions(payload=payload))[None]
-    found = accelerations(1, state, table, case.voltage[None], case.elbows)
-    return [value[0] for value in found]
-
-
-def assume_solvable(matrix, jacobian):
-    """Leaves out arms whose elbows hardly move against each other."""
-    compliance = jacobian @ np.linalg.solve(matrix, jacobian.T)
-    worst = np.linalg.cond(compliance) * np.linalg.cond(matrix) if len(jacobian) else np.linalg.cond(matrix)
-    assume(worst < WORST_CONDITION and (np.diag(compliance) > 1e-6).all())
 
 
 @given(cases())
@@ -38,7 +15,7 @@ def test_fast_form_equals_the_papers_form(case):
     arm, q, q_dot, current, voltage, elbows = case
     assume_solvable(dynamics.mass_matrix(arm, q), dynamics.constraint_jacobian(arm, q, elbows))
     expected = dynamics.forward_dynamics(arm, q, q_dot, current, voltage, elbows)
-    for value, reference, tolerance in zip(fast(case), expected, (1e-10, 1e-10, 1e-13), strict=True):
+    for value, reference, tolerance in zip(accelerations_of(case), expected, (1e-10, 1e-10, 1e-13), strict=True):
         assert_close(value, reference, tolerance)
 
 
@@ -69,6 +46,6 @@ def test_a_payload_is_a_last_link_of_no_size_that_never_turns(case, payload):
     torque = case.arm.of_motors("joint_torque_constant") * current - bias
     drift = dynamics.constraint_bias(case.arm, q, q_dot, elbows)
     expected = np.linalg.solve(system, np.concatenate([torque, -drift]))
-    q_ddot, force, _ = fast(case, payload)
+    q_ddot, force, _ = accelerations_of(case, payload)
     assert_close(q_ddot, expected[:n], 1e-9)
     assert_close(force, expected[n:], 1e-9)

@@ -11,8 +11,8 @@ from elbow_gym import dynamics, kernel, motors
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.table import FRICTION_VELOCITY, TableParameters
-from tests.elbow_gym.kernel.test_kernel import accelerations
-from tests.laws.test_equivalence import assert_close, assume_solvable
+from tests.support.comparisons import assert_close, assume_solvable
+from tests.support.kernel_calls import accelerations
 from tests.support.strategies import between, cases
 
 SWITCHES = [

@@ -8,8 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from elbow_gym import MotorParameters, Simulator, TableParameters, contact, dynamics, kinematics, paper_arm
-from tests.elbow_gym.test_contact import lying, small_arm
-from tests.laws.test_energy import inductor_energy, mechanical_energy, uneven_arm
+from tests.support.arms import inductor_energy, lying, mechanical_energy, small_arm, uneven_arm
 
 ROUGH, SMOOTH = {"friction": 0.3}, {"friction": 0.0}
 DRIVE = {"heat": True, "supply_resistance": 0.2}

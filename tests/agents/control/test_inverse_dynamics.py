@@ -6,7 +6,8 @@ from hypothesis import given
 
 from agents.control.inverse_dynamics import InverseDynamics
 from elbow_gym import Simulator, dynamics, kinematics
-from tests.laws.test_equivalence import assert_close, fast
+from tests.support.comparisons import assert_close
+from tests.support.kernel_calls import accelerations_of
 from tests.support.strategies import cases
 
 ELBOWS = [(), (4,), (4, 7)]
@@ -41,7 +42,7 @@ def test_kernel_under_the_computed_voltage_has_the_asked_acceleration(arm, elbow
     voltage = inverse.voltage(q_dot, current, current_dot)
     case = type("Case", (), {})()
     case.arm, case.q, case.q_dot, case.current, case.voltage, case.elbows = arm, q, q_dot, current, voltage, elbows
-    reached, force, rate = fast(case)
+    reached, force, rate = accelerations_of(case)
     np.testing.assert_allclose(reached, q_ddot, rtol=0.0, atol=1e-8)
     np.testing.assert_allclose(force, elbow_force, rtol=0.0, atol=1e-8)
     np.testing.assert_allclose(rate, current_dot, rtol=0.0, atol=1e-8)

@@ -5,8 +5,9 @@ import pytest
 
 from agents.control.pd import PDController
 from agents.evaluation.metrics import REGIMES, UNITS, joint_energies, metrics
-from agents.evaluation.recording import Recording, record
+from agents.evaluation.recording import record
 from elbow_gym.task.settings import Settings
+from tests.support.recordings import made_up
 
 
 def hand_made(energy_weight=0.001):
@@ -16,25 +17,19 @@ def hand_made(energy_weight=0.001):
     hand = target + np.array([0.003, 0.0, -0.004])
     power = np.array([2.0, -1.0])  # W, constant
     energy = time[:, None, None] * power
-    zeros = np.zeros((6, 1, 2))
-    voltage = zeros.copy()
+    voltage = np.zeros((6, 1, 2))
     voltage[4, 0, 1] = -12.0
-    return Recording(
-        settings=Settings(duration=0.1, energy_weight=energy_weight),
-        seeds=(0,),
-        time=time,
-        q=zeros,
-        q_dot=zeros,
+    return made_up(
+        Settings(elbows=1, duration=0.1, energy_weight=energy_weight),
+        time,
+        joints=2,
         hand=hand,
         target=target,
         electrical_energy=energy,
         drawn_energy=np.maximum(energy, 0.0),
-        copper_loss=zeros,
-        link_work=zeros,
         elbow_force=np.array([3.0, 2.0, -1.0, 4.0, 5.0, 6.0]).reshape(6, 1, 1),
         below_table=time[:, None],
         voltage=voltage,
-        current=zeros,
     )
 
 

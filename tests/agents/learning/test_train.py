@@ -16,24 +16,12 @@ from stable_baselines3 import PPO
 from agents.learning.callback import Keeper
 from agents.learning.checkpoint import checkpoints
 from agents.learning.evaluation import COLUMNS
-from agents.learning.ppo import PPOSettings
-from agents.learning.run_folder import Run
-from agents.learning.sac.settings import SACSettings
 from agents.learning.train import train, train_all
 from agents.learning.training_env import MeteredVectorEnv
 from agents.policy import load_policy
-from elbow_gym.task.settings import Settings
+from tests.support.trainings import SAC_KILLED, SAC_SMALL, SMALL, small_run
 
-SMALL = PPOSettings(
-    total_timesteps=1024, num_envs=4, n_steps=64, batch_size=64, n_epochs=1, hidden=(8,), evaluate_every=256
-)
-
-
-def small_run(folder, **changes):
-    environment = json.loads(json.dumps(Settings(duration=1.0).arguments))
-    return Run(
-        **{"algorithm": "ppo", "environment": environment, "settings": SMALL, "seed": 0, "folder": folder} | changes
-    )
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(scope="module")
@@ -86,27 +74,9 @@ def test_card_tells_how_it_was_made(done):
     assert np.isfinite(card["evaluation"]["return"])
 
 
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-from agents.learning.callback import Keeper
-from agents.learning.train import train
-from tests.agents.learning.test_train import SAC_KILLED, small_run
-
-def die(self):
-    if self.num_timesteps > 600:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return True
-
-Keeper._on_step = die
-changes = SAC_KILLED if sys.argv[2] == "sac" else {}
-train(small_run(Path(sys.argv[1]), checkpoint_seconds=0.0, **changes))
-"""
-
-
 def kill(folder, algorithm):
-    command = [sys.executable, "-c", KILLED, str(folder), algorithm]
-    killed = subprocess.run(command, cwd=Path(__file__).parents[3], capture_output=True, check=False)
+    command = [sys.executable, "-m", "tests.support.trainings", str(folder), algorithm]
+    killed = subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
     assert killed.returncode == -signal.SIGKILL, killed.stderr
 
 
@@ -187,22 +157,6 @@ def test_first_policy_is_where_the_training_starts(done, tmp_path):
     wrong = small_run(tmp_path / "wrong", initial_policy=done[0].folder / "best", settings=replace(SMALL, hidden=(9,)))
     with pytest.raises(ValueError, match=r"layers of the first policy must be \(41, 9, 10\) .* got \(41, 8, 10\)"):
         train(wrong)
-
-
-SAC_SMALL = SACSettings(
-    total_timesteps=1240,
-    num_envs=4,
-    hidden=(8,),
-    gradient_steps=1,
-    batch_size=32,
-    learning_starts=1200,
-    buffer_size=4000,
-    imitation_steps=50,
-)
-SAC_KILLED = {
-    "algorithm": "sac",
-    "settings": replace(SAC_SMALL, total_timesteps=800, learning_starts=400, evaluate_every=200),
-}
 
 
 def test_killed_sac_goes_on_to_the_same_policy(tmp_path):

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from agents.control.pd import PAPER_KD, PAPER_KP
-from agents.evaluation.recording import Recording
 from agents.paper import cases as reproduce
 from agents.paper import claims as verdict
 from agents.style import ELBOW_COLOURS
 from elbow_gym import Simulator
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.task.circle import Circle
+from tests.support.recordings import made_up, papers_target
 
 # shared/design/physics.md, "Numbers that any right implementation gives", by elbow count.
 TABLE = {
@@ -150,26 +150,18 @@ def synthetic(elbows):
     """A made-up run: the hand `1 + elbows` cm under the target, every joint at constant power."""
     settings = reproduce.settings_of(elbows, "paper", control_frequency=100.0, timestep=0.002)
     time = np.linspace(0.0, 5.0, 501)
-    target = Circle().position(Circle().angle(time, 0.0))[:, None]
+    target = papers_target(time)
     ramp = np.repeat(time[:, None, None], 10, axis=2)
     power = np.arange(1.0, 11.0) * (3 - elbows)
-    zeros = np.zeros_like(ramp)
-    return Recording(
+    return made_up(
         settings,
-        (0,),
         time,
-        q=zeros,
-        q_dot=zeros,
         hand=target - [0.0, 0.0, 0.01 * (1 + elbows)],
         target=target,
         electrical_energy=ramp * power,
         drawn_energy=ramp * power,
-        copper_loss=zeros,
         link_work=ramp * 0.5 + 0.01 * elbows * np.sin(ramp),
         elbow_force=np.repeat((time - 1.0)[:, None, None], elbows, axis=2),
-        below_table=np.zeros((501, 1)),
-        voltage=zeros,
-        current=zeros,
     )
 
 

@@ -12,7 +12,6 @@ import pytest
 
 from agents.evaluation.metrics import metrics
 from agents.evaluation.players import CLASSICAL
-from agents.evaluation.recording import Recording
 from agents.paper.cases import RESULTS, measure, settings_of
 from agents.paper.figures import write_series
 from agents.report import colours, command, payload
@@ -23,39 +22,32 @@ from agents.report.runs import Run, play
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, ELBOW_COLOURS
 from benchmarks.energy import pareto
 from elbow_gym.kinematics import joint_positions
-from elbow_gym.task.circle import Circle
 from tests.support.browser import chromium, emulate, keep_picture
+from tests.support.recordings import made_up, papers_target
 
 
 def synthetic(elbows, start):
     """A made-up run whose numbers differ between joints, cases, starts and instants; the arm stands still."""
     settings = settings_of(elbows, "paper", control_frequency=100.0, timestep=0.002, start=start)
     time = np.linspace(0.0, 5.0, 501)
-    target = Circle().position(Circle().angle(time, 0.0))[:, None]
+    target = papers_target(time)
     factor = (3.0 - elbows) * (2.0 if start == "paper" else 1.0)
     ramp = np.repeat((time**2)[:, None, None], 10, axis=2) * np.arange(1.0, 11.0) * factor
     pose = np.broadcast_to(settings.parsed_arm.nominal_pose, (501, 1, 10))
-    zeros = np.zeros_like(ramp)
-    return Recording(
+    return made_up(
         settings,
-        (0,),
         time,
         q=pose,
-        q_dot=zeros,
         hand=target - np.array([0.0, 0.001, 0.01 * (1 + factor)]) * (1.0 + 0.2 * np.sin(time))[:, None, None],
         target=target,
         electrical_energy=ramp,
         drawn_energy=ramp,
-        copper_loss=zeros,
         link_work=0.01 * ramp,
         elbow_force=(time - 1.0)[:, None, None] * np.arange(1.0, 1.0 + elbows),
-        below_table=np.zeros((501, 1)),
-        voltage=zeros,
-        current=zeros,
     )
 
 
-def made_up(controller, elbows, start):
+def invented(controller, elbows, start):
     recording = synthetic(elbows, start)
     regimes = {"paper": {"A": 0.0, "B": 2.0}, "on_target": {"C": 0.0}}[start]
     figures = {
@@ -68,8 +60,8 @@ def made_up(controller, elbows, start):
 @pytest.fixture(scope="module")
 def runs():
     """The paper's cases, made up, and PPO's two runs as they are."""
-    paper = [made_up("pd_paper", elbows, start) for elbows in (2, 1, 0) for start in ("paper", "on_target")]
-    clipped = [made_up("pd_24v", elbows, "paper") for elbows in (2, 1, 0)]
+    paper = [invented("pd_paper", elbows, start) for elbows in (2, 1, 0) for start in ("paper", "on_target")]
+    clipped = [invented("pd_24v", elbows, "paper") for elbows in (2, 1, 0)]
     told = []
     entry = Entry("ppo", 2, RESULTS)
     learned = play(entry, told.append)

@@ -11,46 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from elbow_gym import kernel, kinematics, paper_arm
-from elbow_gym.simulation.options import Conditions
+from elbow_gym import kernel, kinematics
 from elbow_gym.simulation.parameter_rows import parameter_table
+from tests.support.kernel_calls import ELBOWS, accelerations, advanced, batch, states
 
 ROOT = Path(__file__).parents[3]
 VECTORS = np.load(ROOT / "tests" / "vectors" / "forward_dynamics_vectors.npz")
-ELBOWS = (4, 7)
-
-
-def states(q, q_dot, current):
-    """Kernel state rows (B, STATE_ROWS, n) with empty meters."""
-    state = np.zeros((len(q), kernel.STATE_ROWS, q.shape[1]))
-    state[:, 0], state[:, 1], state[:, 2] = q, q_dot, current
-    return state
-
-
-def accelerations(lanes, state, parameters, voltage, elbows, **switches):
-    """The kernel's q_ddot, elbow forces and current rates of a batch."""
-    q_ddot, current_dot, force = np.zeros_like(voltage), np.zeros_like(voltage), np.zeros((len(voltage), len(elbows)))
-    joints = np.array(elbows, dtype=np.int64)
-    kernel.kernel(lanes, **switches).accelerations(state, parameters, voltage, joints, q_ddot, current_dot, force)
-    return q_ddot, force, current_dot
-
-
-def batch(size):
-    """Arms that differ in state, voltage and every parameter, near the start pose."""
-    rng = np.random.default_rng(5)
-    scatter = rng.uniform(0.7, 1.4, (40, kernel.PARAMETER_ROWS, 10))
-    parameters = parameter_table(paper_arm(), Conditions(payload=0.2)) * scatter
-    state = states(paper_arm().nominal_pose + 0.3 * rng.normal(size=(40, 10)), *rng.normal(size=(2, 40, 10)))
-    return state[:size].copy(), parameters[:size].copy(), rng.uniform(-24.0, 24.0, (40, 10))[:size].copy()
-
-
-def advanced(lanes, size, n_steps=20, elbows=ELBOWS):
-    """State and summary of a batch after some steps of 1 ms."""
-    state, parameters, voltage = batch(size)
-    summary = np.zeros((size, kernel.SUMMARY_COLUMNS + len(elbows)))
-    joints = np.array(elbows, dtype=np.int64)
-    kernel.kernel(lanes).advance(state, parameters, voltage, joints, 0, size, n_steps, 0.001, summary)
-    return np.concatenate([state.reshape(size, -1), summary], axis=1)
 
 
 @given(st.floats(-9.9e4, 9.9e4))
@@ -97,7 +63,7 @@ def test_lane_count_and_batch_size_change_no_bit_of_a_run(size):
 
 
 def test_an_uncompiled_kernel_of_odd_width_gives_the_same_bits():
-    script = "from tests.elbow_gym.kernel.test_kernel import advanced; print(advanced(3, 4, n_steps=2).tobytes().hex())"
+    script = "from tests.support.kernel_calls import advanced; print(advanced(3, 4, n_steps=2).tobytes().hex())"
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     run = [sys.executable, "-W", "error", "-c", script]
     done = subprocess.run(run, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)

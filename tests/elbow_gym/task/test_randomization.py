@@ -7,7 +7,7 @@ from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, dynamics, paper_arm
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.task.arm_batch import Population
 from elbow_gym.task.randomization import FACTORS, Randomization
-from tests.elbow_gym.kernel.test_kernel import accelerations, states
+from tests.support.kernel_calls import accelerations, states
 
 EVERYTHING = {
     **{name: [0.9, 1.1] for name in FACTORS},
