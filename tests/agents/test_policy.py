@@ -10,8 +10,7 @@ from stable_baselines3 import PPO
 
 import agents.policy as policies
 from agents.learning.sac.settings import SACSettings
-from agents.policy import Policy, load_policy, policy_of, shipped_policies
-from agents.tasks import task_name
+from agents.policy import Policy, load_policy, policy_of
 from elbow_gym.env import ElbowArmEnv
 from elbow_gym.sb3 import SB3VecEnv
 from elbow_gym.task.settings import Settings
@@ -134,21 +133,6 @@ def test_bundle_that_does_not_fit_is_refused(policy, tmp_path):
         load_policy(tmp_path / "p")
 
 
-def test_every_shipped_policy_loads_fits_and_is_small():
-    assert "ppo_elbows2_seed0" in shipped_policies()
-    files = list(policies.SHIPPED.iterdir())
-    assert sum(path.stat().st_size for path in files) <= 12_000_000
-    assert {path.suffix for path in files} == {".json", ".safetensors"}
-    for name in shipped_policies():
-        policy = load_policy(policies.SHIPPED / name)
-        policy.check(ElbowArmEnv(**policy.card.environment))
-        assert sum(path.stat().st_size for path in policies.pair(policies.SHIPPED / name)) < 300_000
-        assert policy.card.command.startswith(("python -m agents train", "python -m agents clone"))
-        task = task_name(policy.card.env, policy.card.environment["elbows"])
-        assert name.startswith(policy.card.algorithm)
-        assert name.endswith(f"{task}_seed{policy.card.training['seed']}")
-
-
 def test_best_seed_is_loaded_unless_one_is_given(policy, tmp_path, monkeypatch):
     monkeypatch.setattr(policies, "SHIPPED", tmp_path)
     for seed, merit in ((0, -40.0), (3, -30.0), (10, -35.0)):
@@ -164,15 +148,3 @@ def test_best_seed_is_loaded_unless_one_is_given(policy, tmp_path, monkeypatch):
         load_policy("sac", elbows=1)
     with pytest.raises(ValueError, match=r"env must be one of .*, got 'Pendulum-v1'"):
         load_policy("ppo", env="Pendulum-v1")
-
-
-def test_shipped_two_elbow_policy_holds_its_promise():
-    from agents.learning.evaluation import evaluation
-
-    policy = load_policy("ppo", elbows=2)
-    figures = evaluation(policy, policy.settings)
-    assert figures["electrical_energy"] <= 250.0
-    assert figures["steady_error_rms_mm"] <= 5.0
-    for name in figures.keys() & policy.card.evaluation.keys():
-        np.testing.assert_allclose(policy.card.evaluation[name], figures[name], rtol=1e-3)
-    assert policy.card.training["seconds"] <= 600

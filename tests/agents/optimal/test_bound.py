@@ -10,7 +10,7 @@ from agents.control.trajectory import OpenLoop, Trajectory
 from agents.optimal.bound import rollout
 from benchmarks.optimal import Cell, cached, cells, files
 from elbow_gym import Simulator
-from elbow_gym.kinematics import elbow_heights, inverse_kinematics, joint_positions
+from elbow_gym.kinematics import elbow_heights, inverse_kinematics
 from elbow_gym.task.circle import Circle
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
@@ -156,19 +156,3 @@ def test_a_result_of_another_problem_is_not_taken_over(arm, tmp_path):
 def test_cells_have_names_of_their_own():
     names = [cell.name for cell in cells()]
     assert len(set(names)) == len(names)
-
-
-def test_what_may_go_under_the_table_does_and_is_better_for_it(arm):
-    for elbows in (1, 0):
-        held, free = Cell(elbows), Cell(elbows, under=True)
-        lowest = {cell: joint_positions(arm, Trajectory.load(files(cell)[1]).q)[..., 2].min() for cell in (held, free)}
-        assert lowest[free] < -0.1 < -1e-3 < lowest[held]
-        assert cached(free)["closed_loop"] < cached(held)["closed_loop"]
-
-
-@pytest.mark.parametrize("cell", [cell for cell in cells() if cached(cell)], ids=lambda cell: cell.name)
-def test_committed_trajectory_repeats_its_cost_in_the_simulator(cell):
-    figures, trajectory = cached(cell), Trajectory.load(files(cell)[1])
-    found, _ = rollout(cell.problem.settings, lambda env: OpenLoop(env, trajectory))
-    assert -found == pytest.approx(figures["closed_loop"], rel=1e-4)
-    assert -found == pytest.approx(figures["predicted_cost"], rel=0.02)

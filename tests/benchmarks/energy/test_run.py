@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from agents.control.pd import CLIPPED, PDController
-from agents.evaluation.metrics import REGIMES, UNITS
 from agents.evaluation.players import SHIFTED
 from agents.evaluation.recording import record
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES
@@ -17,8 +16,6 @@ from benchmarks.energy import cells as lineup
 from benchmarks.energy import run as energy
 from benchmarks.energy.cells import Cell
 from benchmarks.energy.statistics import interquartile_mean
-from benchmarks.machine import RESULTS
-from benchmarks.optimal import FRONT_WEIGHTS
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -176,67 +173,11 @@ def test_gain_family_runs_from_soft_to_stiff(tmp_path):
     assert len((tmp_path / "gains.csv").read_text().splitlines()) == 4
 
 
-def test_the_front_has_a_point_for_every_price_of_power_and_none_from_under_the_table():
-    for elbows in (2, 1, 0):
-        points = pareto.front(elbows)
-        assert len(points) == 1 + len(FRONT_WEIGHTS)
-        assert np.all(np.diff([energy for _, energy in points]) < 0.0)
-
-
-def test_lqr_stays_within_five_percent_of_the_bound_at_every_elbow_count():
-    gaps = {int(row["elbows"]): row for row in committed() if row["controller"] == "lqr" and row["regime"] == "A"}
-    assert sorted(gaps) == [0, 1, 2]
-    for row in gaps.values():
-        assert float(row["optimality_gap [-]"]) < 0.05
-
-
-def committed():
-    with (RESULTS / "energy.csv").open() as handle:
-        return list(csv.DictReader(handle))
-
-
-def test_committed_results_hold_every_cell_and_regime():
-    found = {(row["controller"], int(row["elbows"]), row["regime"]) for row in committed()}
-    nominal = [cell for cell in lineup.cells() if cell.part == "nominal"]
-    assert found == {(cell.controller, cell.elbows, regime.name) for cell in nominal for regime in REGIMES}
-
-
-def test_committed_table_is_made_of_the_committed_figures():
-    lines = (RESULTS / "energy.md").read_text().splitlines()[2:]
-    for line, row in zip(lines, committed(), strict=True):
-        cells = [cell.strip() for cell in line.strip("|").split("|")]
-        value = float(row["electrical_energy [J]"])
-        assert float(cells[3].split()[0]) == pytest.approx(value, rel=1e-3)
-        assert float(cells[5].split()[0]) == pytest.approx(float(row["error_rms [mm]"]), rel=1e-3)
-    assert set(UNITS) <= {name.split(" ")[0] for name in committed()[0]}
-
-
-def test_committed_brief_table_puts_the_regimes_of_the_committed_figures_side_by_side():
-    by_key = {(row["elbows"], CONTROLLER_NAMES[row["controller"]], row["regime"]): row for row in committed()}
-    lines = [line.strip("| ").split(" | ") for line in (RESULTS / "energy_brief.md").read_text().splitlines()[2:]]
-    assert 3 * len(lines) == len(by_key)
-    for elbows, name, gain, _, whole, steady, error, on_target, _ in lines:
-        for cell, regime, column in (
-            (gain, "A", "return [-]"),
-            (whole, "A", "electrical_energy [J]"),
-            (steady, "B", "electrical_energy [J]"),
-            (error, "B", "error_rms [mm]"),
-            (on_target, "C", "electrical_energy [J]"),
-        ):
-            assert float(cell.split()[0]) == pytest.approx(float(by_key[elbows, name, regime][column]), rel=1e-3)
-    order = [(int(line[0]), float(line[2].split()[0])) for line in lines]
-    assert order == sorted(order, reverse=True)
-
-
 def test_shifted_set_asks_for_what_the_nominal_one_does_not_have():
     nominal, shifted = Settings(), replace(Settings(), **SHIFTED)
     assert shifted.start_noise > nominal.start_noise
     assert {"radius", "period", "phase"} <= set(shifted.parsed_circle.drawn)
     assert shifted.randomization.lowest("payload") > nominal.payload
-    with (RESULTS / "energy_shifted.csv").open() as handle:
-        found = {(row["controller"], int(row["elbows"]), row["regime"]) for row in csv.DictReader(handle)}
-    shifted = [cell for cell in lineup.cells() if cell.part == "shifted"]
-    assert found == {(cell.controller, cell.elbows, regime) for cell in shifted for regime in "AB"}
 
 
 def test_pd_on_drawn_circles_tracks_each_arms_own():
