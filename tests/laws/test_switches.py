@@ -1,26 +1,27 @@
-"""With every switch on or off, the compiled recursion equals the reference equations."""
+"""With every switch on or off, the recursion equals the reference equations, and a switch does no more than it says."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from elbow_gym import dynamics, kernel, motors
+from elbow_gym import dynamics, kernel, motors, paper_arm
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
-from elbow_gym.table import FRICTION_VELOCITY, TableParameters
+from elbow_gym.table import TableParameters
 from tests.support.comparisons import assert_close, assume_solvable
-from tests.support.kernel_calls import accelerations
+from tests.support.kernel_calls import EVERYTHING, accelerations, uncompiled
 from tests.support.strategies import between, cases
 
-SWITCHES = [
-    {"table": True},
-    {"rubbing": True},
-    {"drive": True},
-    {"table": True, "rubbing": True, "drive": True},
-]
+SETS = [dict(zip(EVERYTHING, on, strict=True)) for on in product((False, True), repeat=3)]
+"""Every combination of switches; a kernel is compiled for each that is asked for."""
+
+
+def named(on):
+    return "+".join(name for name in on if on[name]) or "none"
 
 
 @st.composite
@@ -66,11 +67,17 @@ def expected(case, under, rise):
     return dynamics.forward_dynamics(arm, q, q_dot, current, voltage, elbows, **extra)
 
 
-@pytest.mark.parametrize("switches", SWITCHES, ids="+".join)
+@pytest.mark.parametrize(
+    ("make", "on"),
+    [
+        (kernel.kernel, EVERYTHING),
+        *((uncompiled, {**dict.fromkeys(EVERYTHING, False), name: True}) for name in EVERYTHING),
+    ],
+    ids=["compiled, everything", *EVERYTHING],
+)
 @given(data=st.data())
 @settings(max_examples=60)
-def test_fast_form_equals_the_reference_with_every_switch(switches, data):
-    on = {name: switches.get(name, False) for name in ("table", "rubbing", "drive")}
+def test_fast_form_equals_the_reference_with_every_switch(make, on, data):
     case = data.draw(rough_cases() if on["drive"] else cases(largest=8))
     under = data.draw(conditions(**on))
     assume_solvable(dynamics.mass_matrix(case.arm, case.q), dynamics.constraint_jacobian(case.arm, case.q, case.elbows))
@@ -79,11 +86,56 @@ def test_fast_form_equals_the_reference_with_every_switch(switches, data):
     state[0, :3] = case.q, case.q_dot, case.current
     state[0, kernel.SWITCHED_STATE.index("temperature_rise") + kernel.STATE_ROWS] = rise
     parameters = parameter_table(case.arm, under)[None]
-    found = accelerations(1, state, parameters, case.voltage[None], case.elbows, **on)
+    found = accelerations(1, state, parameters, case.voltage[None], case.elbows, make, **on)
     for value, reference, tolerance in zip(found, expected(case, under, rise), (1e-9, 1e-9, 1e-12), strict=True):
         assert_close(value[0], reference, tolerance)
 
 
-def test_smoothing_speeds_are_the_references():
-    assert kernel.GEAR_SPEED == motors.COULOMB_VELOCITY
-    assert kernel.ELBOW_SPEED == FRICTION_VELOCITY
+def advanced(entries, rows, on):
+    """State and summary of three arms after ten steps of 0.5 ms, under what is on and nothing of what is off."""
+    rng = np.random.default_rng(5)
+    under = Conditions(
+        table={"friction": 0.3, "stiffness": 1e4} if on["table"] else None,
+        elbow_friction=0.2 if on["rubbing"] else 0.0,
+        heat=on["drive"],
+        supply_resistance=0.1 if on["drive"] else 0.0,
+        regeneration=not on["drive"],
+    )
+    rough = tuple(replace(motor, gear_coulomb_friction=0.01 * on["drive"]) for motor in paper_arm().motors)
+    parameters = parameter_table(replace(paper_arm(), motors=rough), under)
+    # Without a table, the default one's stiffness stands in the row that a kernel without one does not read.
+    parameters[kernel.PARAMETERS.index("stiffness")] *= on["table"]
+    state, elbows = np.zeros((3, rows, 10)), np.array([4, 7])
+    state[:, 0] = paper_arm().nominal_pose + 0.02 * rng.normal(size=(3, 10))
+    state[:, 1:3] = rng.normal(size=(3, 2, 10))
+    parameters = parameters * rng.uniform(0.8, 1.25, (3, *parameters.shape))
+    summary, voltage = np.zeros((3, kernel.SUMMARY_COLUMNS + 2)), rng.uniform(-20.0, 20.0, (3, 10))
+    entries.advance(state, parameters, voltage, elbows, 0, 3, 10, 5e-4, summary)
+    return state, summary
+
+
+def uncompiled_run(on):
+    return advanced(uncompiled(1, **on), kernel.SWITCHED_STATE_ROWS if any(on.values()) else kernel.STATE_ROWS, on)
+
+
+@pytest.mark.parametrize("on", SETS, ids=named)
+def test_a_switch_that_has_nothing_to_do_changes_no_bit(on):
+    state, summary = advanced(kernel.kernel(1, **EVERYTHING), kernel.SWITCHED_STATE_ROWS, on)
+    expected_state, expected_summary = uncompiled_run(on)
+    rows = expected_state.shape[1]
+    np.testing.assert_array_equal(state[:, :rows], expected_state)
+    np.testing.assert_array_equal(summary, expected_summary)
+    assert not state[:, rows:].any()
+    losses = dict(zip(kernel.SWITCHED_STATE, state[:, kernel.STATE_ROWS :].any(axis=(0, 2)), strict=True))
+    assert losses["contact_normal"] == on["table"]
+    assert losses["contact_loss"] == (on["table"] or on["rubbing"])
+    assert losses["temperature_rise"] == losses["supply_loss"] == on["drive"]
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("lanes", [1, kernel.BLOCK_LANES])
+@pytest.mark.parametrize("on", SETS, ids=named)
+def test_every_kernel_compiles_to_the_bits_of_its_source(on, lanes):
+    rows = kernel.SWITCHED_STATE_ROWS if any(on.values()) else kernel.STATE_ROWS
+    for found, expected_array in zip(advanced(kernel.kernel(lanes, **on), rows, on), uncompiled_run(on), strict=True):
+        np.testing.assert_array_equal(found, expected_array)

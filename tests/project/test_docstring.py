@@ -52,7 +52,7 @@ def test_observation_table_counts_the_entries(n):
 
 
 def test_switched_features_have_the_entries_that_the_table_says():
-    env = ElbowArmEnv(table=True, heat=True, randomize={"action_delay": [0, 2]})
+    env = ElbowArmEnv(table=True, elbow_friction=0.1, heat=True, randomize={"action_delay": [0, 2]})
     sizes = dict(zip([name for name, *_ in table("Observation Space")], env.episodes.layout.sizes, strict=True))
     assert (sizes["contact_force"], sizes["temperature_rise"], sizes["pending_voltage"]) == (9, 10, 20)
     assert [entries.split(",")[0].split(" ")[0] for _, entries, *_ in table("Observation Space")[-3:]] == [
@@ -63,7 +63,8 @@ def test_switched_features_have_the_entries_that_the_table_says():
 
 
 def test_switches_add_the_info_keys_that_the_page_names():
-    env = ElbowArmEnv(table=True, heat=True, supply_resistance=0.1, randomize={"payload": [0.0, 0.1]})
+    switches = {"table": True, "elbow_friction": 0.1, "heat": True, "supply_resistance": 0.1}
+    env = ElbowArmEnv(**switches, randomize={"payload": [0.0, 0.1]})
     drawn = env.reset(seed=0)[1]
     more = {"contact_force", "load_bearing", "contact_loss", "temperature_rise", "overheated", "supply_loss"}
     assert set(drawn) - set(ElbowArmEnv().reset(seed=0)[1]) == {*more, "parameters"}

@@ -1,12 +1,29 @@
-"""Calls of the compiled kernel's entries with plain arrays, batch axis first."""
+"""Calls of the kernel's entries, compiled or not, with plain arrays, batch axis first."""
+
+from functools import cache
 
 import numpy as np
+from numba.core import config
 
 from elbow_gym import kernel, paper_arm
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 
 ELBOWS = (4, 7)
+EVERYTHING = {"table": True, "rubbing": True, "drive": True}
+"""The switches of the kernel that has them all on."""
+
+_build = kernel.kernel.__wrapped__
+
+
+@cache
+def uncompiled(lanes, **switches):
+    """The kernel's entries as plain Python: a millisecond for a step of one arm, and nothing to compile."""
+    disabled, config.DISABLE_JIT = config.DISABLE_JIT, True
+    try:
+        return _build(lanes, **switches)
+    finally:
+        config.DISABLE_JIT = disabled
 
 
 def states(q, q_dot, current):
@@ -16,11 +33,11 @@ def states(q, q_dot, current):
     return state
 
 
-def accelerations(lanes, state, parameters, voltage, elbows, **switches):
-    """The kernel's q_ddot, elbow forces and current rates of a batch."""
+def accelerations(lanes, state, parameters, voltage, elbows, make=kernel.kernel, **switches):
+    """The kernel's q_ddot, elbow forces and current rates of a batch; `make` is what gives the kernel's entries."""
     q_ddot, current_dot, force = np.zeros_like(voltage), np.zeros_like(voltage), np.zeros((len(voltage), len(elbows)))
     joints = np.array(elbows, dtype=np.int64)
-    kernel.kernel(lanes, **switches).accelerations(state, parameters, voltage, joints, q_ddot, current_dot, force)
+    make(lanes, **switches).accelerations(state, parameters, voltage, joints, q_ddot, current_dot, force)
     return q_ddot, force, current_dot
 
 

@@ -1,10 +1,13 @@
-"""Hashes of seeded rollouts; as a module, `python -m tests.support.rollouts`, it prints one of each kind."""
+"""Hashes of seeded rollouts.
+
+As a module, `python -m tests.support.rollouts`, it prints two of them and how many functions had to be compiled.
+"""
 
 import hashlib
 
 import numpy as np
 
-from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv
+from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, kernel
 
 SETTINGS = {"circle": {"phase": "random"}, "duration": 0.5}
 
@@ -35,5 +38,11 @@ def batch(seed, num_envs=20, num_threads=1):
     return digest.hexdigest()
 
 
+def compiled():
+    """How many of the compiled functions that a rollout calls were not in the cache."""
+    entries = [entry for lanes in (1, kernel.BLOCK_LANES) for entry in kernel.kernel(lanes)]
+    return sum(sum(entry.stats.cache_misses.values()) for entry in (*entries, kernel.drive, kernel.observe))
+
+
 if __name__ == "__main__":
-    print(single(0), batch(0))
+    print(single(0), batch(0), compiled())

@@ -16,6 +16,7 @@ EVERYTHING = {
     "sensor_noise": [0.0, 0.01],
     "action_delay": [0, 2],
 }
+SWITCHES = {"table": True, "elbow_friction": 0.1, "heat": True}
 CIRCLE = {"radius": [0.05, 0.1], "period": [4.0, 6.0], "phase": "random", "plane": "random"}
 
 
@@ -24,7 +25,7 @@ def actions(arms, steps, seed=0):
 
 
 def test_draws_stay_in_their_ranges_and_differ_from_arm_to_arm():
-    _, info = ElbowArmVectorEnv(64, randomize=EVERYTHING, gear_coulomb_friction=0.01).reset(seed=0)
+    _, info = ElbowArmVectorEnv(64, randomize=EVERYTHING, gear_coulomb_friction=0.01, **SWITCHES).reset(seed=0)
     drawn = info["parameters"]
     nominal = Population(paper_arm(), Conditions(), Randomization(), 1).nominal
     nominal["gear_coulomb_friction"] = np.full(10, 0.01)
@@ -73,7 +74,7 @@ def test_a_random_batch_equals_single_environments_bit_for_bit(mode):
 
 
 def test_a_saved_state_of_a_random_arm_goes_on_bit_for_bit():
-    arguments = {"randomize": EVERYTHING, "circle": CIRCLE, "heat": True}
+    arguments = {"randomize": EVERYTHING, "circle": CIRCLE, **SWITCHES}
     env, other = ElbowArmEnv(**arguments), ElbowArmEnv(**arguments)
     env.reset(seed=3)
     played = actions(1, 20)[:, 0]
