@@ -13,6 +13,7 @@ import pytest
 from benchmarks.speed import environments, peers
 from benchmarks.speed import own as contenders
 from benchmarks.speed import run as speed
+from benchmarks.speed.rows import Row, ratios
 from elbow_gym import Simulator
 from elbow_gym.dynamics import forward_dynamics
 
@@ -24,12 +25,19 @@ def quick_starts(monkeypatch):
 
 
 @pytest.fixture
+def small_batches(monkeypatch):
+    monkeypatch.setattr(contenders, "BATCH", 32)
+    monkeypatch.setattr(environments, "VECTOR_ARMS", 32)
+
+
+@pytest.fixture
 def no_peers(monkeypatch):
     for name in ("mujoco", "pinocchio"):
         monkeypatch.setitem(sys.modules, name, None)
 
 
-@pytest.mark.usefixtures("quick_starts", "no_peers")
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick_starts", "small_batches", "no_peers")
 def test_quick_run_writes_all_own_rows_and_names_missing_peers(tmp_path, capsys, monkeypatch):
     # Copies in processes of their own are slow to start, and Gymnasium's business.
     without = [c for c in speed.contenders(quick=True) if "AsyncVectorEnv" not in c.name]
@@ -127,6 +135,26 @@ def test_a_peer_with_another_arm_is_refused(monkeypatch):
         peers.check_agreement()
 
 
+def row(family, name, unit, microseconds, joints=10):
+    contender = contenders.Contender(family=family, name=name, unit=unit, make=None, joints=joints, elbows=2)
+    return Row(contender, (1e-6 * microseconds,))
+
+
+def test_a_row_is_held_against_mujocos_time_for_the_same_on_the_same_arm():
+    rows = [
+        row(peers.MUJOCO, peers.C_LOOP, STEP, 20.0),
+        row(peers.MUJOCO, "mj_forward", contenders.EVALUATION, 5.0),
+        row(OURS, "single arm", STEP, 2.0),
+        row(OURS, "single arm", contenders.EULER_STEP, 4.0),
+        row(OURS, "single arm", contenders.EVALUATION, 1.0),
+        # An environment's step holds ten RK4 steps.
+        row(OURS, "environment", contenders.ENV_STEP, 100.0),
+        row(OURS, "single arm", STEP, 2.0, joints=40),
+    ]
+    assert ratios(rows) == pytest.approx([1.0, 1.0, 10.0, 5.0, 5.0, 2.0, None])
+
+
+@pytest.mark.timing
 def test_peers_rows_run_and_are_held_against_mujocos_step():
     pytest.importorskip("mujoco")
     pytest.importorskip("pinocchio")
@@ -134,7 +162,7 @@ def test_peers_rows_run_and_are_held_against_mujocos_step():
     rows, skipped = speed.measure(chosen, True, lambda *_: None)
     assert [row.contender for row in rows] == chosen
     assert not skipped
-    found = {(r.contender.name, r.contender.unit): ratio for r, ratio in zip(rows, speed.ratios(rows), strict=True)}
+    found = {(r.contender.name, r.contender.unit): ratio for r, ratio in zip(rows, ratios(rows), strict=True)}
     assert found["C loop", STEP] == found["mj_forward", contenders.EVALUATION] == 1.0
     assert found["C loop", contenders.EULER_STEP] > 1.0
     assert found["exact elbow path", STEP] < 1.0
