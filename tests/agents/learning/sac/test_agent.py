@@ -1,6 +1,5 @@
 """The SAC: critics that are quadratic around the actor's slow copy, deaf to large errors."""
 
-import copy
 from itertools import pairwise
 
 import gymnasium
@@ -10,7 +9,6 @@ import torch
 from gymnasium.envs.classic_control import PendulumEnv
 from gymnasium.spaces import Box
 from gymnasium.wrappers import TimeLimit
-from stable_baselines3.common.logger import configure
 
 from agents.learning.sac.agent import SAC, Batch, CentredPolicy
 from agents.learning.sac.critic import QuadraticCritics
@@ -77,37 +75,66 @@ def test_linear_loss_pulls_no_harder_however_large_the_error():
     assert squared.item() == pytest.approx((1.0 + 9.0) / 4)
 
 
+def make_constant(critics, value, slope):
+    """Lets two critics of one joint say the same everywhere: their values at the centre and their slopes."""
+    with torch.no_grad():
+        critics.weights[-1].zero_()
+        critics.biases[-1].zero_()
+        critics.biases[-1][:, 0, 0] = torch.tensor(value)
+        critics.biases[-1][:, 0, 1] = torch.tensor(slope)
+        # Next to no curvature.
+        critics.biases[-1][:, 0, 2] = -40.0
+
+
+def make_steady(actor, log_std):
+    """Lets an actor act with mean 0 and one standard deviation everywhere."""
+    with torch.no_grad():
+        for layer in (actor.mu, actor.log_std):
+            layer.weight.zero_()
+            layer.bias.zero_()
+        actor.log_std.bias.fill_(log_std)
+
+
 def test_target_is_the_reward_and_the_worse_critics_discounted_value_with_the_entropy():
-    model = small(ent_coef=0.5)
-    after = torch.randn(3, 3)
-    batch = Batch(
-        torch.zeros(3, 3), torch.zeros(3, 1), torch.tensor([1.0, 2.0, 3.0]), torch.tensor([0.9, 0.0, 0.9]), after
-    )
-    torch.manual_seed(1)
-    target = model._target(batch, torch.tensor(0.5))
-    torch.manual_seed(1)
-    action, log_prob = model.actor.action_log_prob(after)
-    values = model.critic_target(after)(action - model.policy.center(after)).detach()
-    expected = batch.reward + batch.discount * (values.min(0).values - 0.5 * log_prob.detach())
-    torch.testing.assert_close(target, expected)
-    assert target[1] == 2.0
+    model, count = small(ent_coef=0.5), 4000
+    make_constant(model.critic_target, (3.0, 5.0), (0.0, 0.0))
+    make_steady(model.actor, -3.0)
+    model.policy.follow(1.0, 1.0)
+    reward, discount = torch.linspace(-1.0, 1.0, count), torch.full((count,), 0.9)
+    discount[0] = 0.0
+    batch = Batch(torch.zeros(count, 3), torch.zeros(count, 1), reward, discount, torch.zeros(count, 3))
+    torch.testing.assert_close(model._target(batch, torch.tensor(0.0)), reward + discount * 3.0)
+    paid = model._target(batch, torch.tensor(0.5)) - (reward + discount * 3.0)
+    assert paid[0] == 0.0
+    # A normal distribution's entropy, which the tanh hardly changes at so small a deviation.
+    entropy = 0.5 * np.log(2.0 * np.pi * np.e) - 3.0
+    assert paid[1:].mean().item() == pytest.approx(0.5 * 0.9 * entropy, abs=0.02)
 
 
-def test_actor_is_paid_by_the_worse_critic_and_for_its_entropy():
-    model = small(ent_coef=0.5, actor_rate=1.0)
-    before = copy.deepcopy(model.policy)
-    observation, after = torch.randn(8, 3), torch.randn(8, 3)
-    model._logger = configure(None, [])
-    batch = Batch(observation, torch.zeros(8, 1), torch.zeros(8), torch.ones(8), after)
-    torch.manual_seed(1)
-    _, loss = model._step(batch)
-    torch.manual_seed(1)
-    before.actor.action_log_prob(after)
-    action, log_prob = before.actor.action_log_prob(observation)
-    values = before.critic(observation)(action - before.center(observation))
-    assert loss == pytest.approx((0.5 * log_prob - values.min(0).values).mean().item(), rel=1e-5)
-    assert (values.argmin(0) == 0).any()
-    assert (values.argmin(0) == 1).any()
+def batch_of(count):
+    observation, after = torch.randn(2, count, 3)
+    return Batch(observation, torch.zeros(count, 1), torch.zeros(count), torch.ones(count), after)
+
+
+@pytest.mark.parametrize("slope", [(1.0, -1.0), (-1.0, 1.0)])
+def test_actor_climbs_the_slope_of_the_worse_critic(slope):
+    model = small(ent_coef=0.0, actor_rate=1.0)
+    make_constant(model.critic, (0.0, 10.0), slope)
+    batch = batch_of(64)
+    before = model.actor(batch.observation, deterministic=True)
+    model._step(batch)
+    assert ((model.actor(batch.observation, deterministic=True) - before) * slope[0] > 0.0).all()
+
+
+@pytest.mark.parametrize(("ent_coef", "wider"), [(1.0, True), (0.0, False)])
+def test_actor_is_paid_for_its_entropy(ent_coef, wider):
+    model = small(ent_coef=ent_coef, actor_rate=1.0)
+    make_constant(model.critic, (0.0, 0.0), (0.0, 0.0))
+    make_steady(model.actor, -2.0)
+    batch = batch_of(64)
+    model._step(batch)
+    log_std = model.actor.get_action_dist_params(batch.observation)[1]
+    assert (log_std > -2.0).all() == wider
 
 
 def test_actor_waits_for_the_critics_and_the_centre_trails_it():
@@ -161,13 +188,13 @@ def test_proximity_holds_the_actor_to_the_centre():
     assert departure(1e4) < 0.2 * departure(0.0)
 
 
-def test_actor_climbs_the_slope_and_learned_weight_of_the_entropy_meets_its_target():
-    model = small(ent_coef="auto_0.1", target_entropy=-1.0, learning_starts=0)
-    model.learn(1)
+@pytest.mark.parametrize(("log_prob", "direction"), [(3.0, 1), (0.0, -1), (1.0, 0)])
+def test_price_of_entropy_rises_while_there_is_less_than_its_target_and_falls_while_there_is_more(log_prob, direction):
+    # The target, -1, is met at a mean log-probability of 1; a larger one means less entropy.
+    model = small(ent_coef="auto_0.1", target_entropy=-1.0)
     before = model.log_ent_coef.item()
-    # A log-probability above minus the target means too little entropy: its price rises.
-    model._price_entropy(torch.tensor([3.0]))
-    assert model.log_ent_coef.item() > before
+    model._price_entropy(torch.tensor([log_prob]))
+    assert np.sign(model.log_ent_coef.item() - before) == direction
 
 
 class Bandit(gymnasium.Env):
