@@ -1,10 +1,13 @@
 """Metrics by hand on a run that can be worked out on paper."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from agents.control.pd import PDController
 from agents.evaluation.metrics import REGIMES, UNITS, joint_energies, metrics
+from agents.evaluation.players import in_all_regimes
 from agents.evaluation.recording import record
 from elbow_gym.task.settings import Settings
 from tests.support.recordings import made_up
@@ -64,9 +67,40 @@ def test_counting_from_outside_the_run_is_refused(since):
         metrics(hand_made(), since)
 
 
-def test_every_metric_has_a_unit_and_every_regime_a_meaning():
+def test_every_metric_has_a_unit():
     assert set(metrics(hand_made())) == set(UNITS)
-    assert [regime.name for regime in REGIMES] == ["A", "B", "C"]
+
+
+class Constant:
+    """The same small voltage on all joints."""
+
+    def __init__(self, env):
+        self.action = np.full(env.action_space.shape, 0.05, np.float32)
+
+    def predict(self, _, **__):
+        return self.action, None
+
+
+def test_regimes_are_the_whole_run_its_end_and_a_run_from_the_target():
+    settings = Settings(duration=2.2, start_noise=0.0)
+    found = in_all_regimes(settings, Constant, seeds=[3])
+    from_pose, on_target = (record(replace(settings, start=start), Constant, [3]) for start in ("paper", "on_target"))
+    assert np.linalg.norm(from_pose.hand[0] - from_pose.target[0]) > 1.5
+    assert np.linalg.norm(on_target.hand[0] - on_target.target[0]) < 1e-6
+    energy, from_target = (run.electrical_energy.sum(axis=-1) for run in (from_pose, on_target))
+    [two_seconds] = np.flatnonzero(np.isclose(from_pose.time, 2.0))
+    expected = {"A": energy[-1], "B": energy[-1] - energy[two_seconds], "C": from_target[-1]}
+    for name, spent in expected.items():
+        np.testing.assert_allclose(found[name]["electrical_energy"], spent, rtol=1e-12, err_msg=name)
+    late = np.linalg.norm(from_pose.hand - from_pose.target, axis=-1)[two_seconds + 1 :]
+    np.testing.assert_allclose(found["B"]["error_max"], 1e3 * late.max(axis=0), rtol=1e-12)
+
+
+@pytest.mark.parametrize("regime", REGIMES, ids=lambda regime: regime.name)
+def test_a_regimes_meaning_says_where_it_starts_and_what_counts(regime):
+    assert (regime.start == "paper") == ("paper's pose" in regime.meaning)
+    assert (regime.start == "on_target") == ("on target from the start" in regime.meaning)
+    assert f"{regime.since:g}-{Settings().duration:g} s" in regime.meaning
 
 
 def test_recorded_return_is_the_sum_of_rewards():

@@ -1,70 +1,14 @@
 """Optimal control on a short episode: derivatives, constraints, and the simulator reaching what was promised."""
 
-import json
-
 import numpy as np
 import pytest
 
-from agents.control.lqr import TimeVaryingLQR, linearised_periods, lqr_gains
+from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import OpenLoop, Trajectory
 from agents.optimal.bound import rollout
-from benchmarks.optimal import Cell, cached, cells, files
-from elbow_gym import Simulator
 from elbow_gym.kinematics import elbow_heights, inverse_kinematics
 from elbow_gym.task.circle import Circle
 from elbow_gym.task.settings import Settings
-from elbow_gym.vector_env import ElbowArmVectorEnv
-
-
-def resting(arm, periods=5):
-    """The start pose at rest, without voltages."""
-    q, zero = np.tile(arm.nominal_pose, (periods + 1, 1)), np.zeros((periods + 1, arm.n_joints))
-    return Trajectory(q, zero, zero, zero[1:])
-
-
-def test_trajectory_survives_its_file(arm, tmp_path):
-    trajectory = resting(arm)
-    trajectory.save(tmp_path / "t.npz")
-    for name, array in vars(Trajectory.load(tmp_path / "t.npz")).items():
-        np.testing.assert_array_equal(array, getattr(trajectory, name))
-
-
-def test_open_loop_plays_the_voltages_period_by_period(arm):
-    trajectory = resting(arm)
-    trajectory.voltage[:] = np.arange(50.0).reshape(5, 10) / 10.0
-    _, recording = rollout(Settings(duration=0.1), lambda env: OpenLoop(env, trajectory))
-    np.testing.assert_allclose(recording.voltage[1:, 0], trajectory.voltage, rtol=1e-6)
-
-
-@pytest.mark.parametrize("elbows", [0, 2])
-def test_linearised_period_predicts_the_simulators_next_state(arm, elbows):
-    settings, trajectory = Settings(elbows=elbows, duration=0.1), resting(arm)
-    A, B = linearised_periods(settings, trajectory)
-    simulator = Simulator(arm, elbows, 2)
-    rng = np.random.default_rng(0)
-    current, voltage = 1e-3 * rng.normal(size=10), 1e-3 * rng.normal(size=10)
-    poses = simulator.on_table(np.array([arm.nominal_pose, arm.nominal_pose + 1e-4 * rng.normal(size=10)]))
-    simulator.reset(poses, current=np.stack([np.zeros(10), current]))
-    simulator.step(np.stack([np.zeros(10), voltage]), settings.n_substeps)
-    after = np.concatenate([simulator.q, simulator.q_dot, simulator.current], axis=-1)
-    deviation = np.concatenate([poses[1] - poses[0], np.zeros(10), current])
-    np.testing.assert_allclose(A[0] @ deviation + B[0] @ voltage, after[1] - after[0], atol=2e-5)
-
-
-def test_lqr_without_a_deviation_gives_the_planned_voltage(arm):
-    trajectory = resting(arm)
-    trajectory.voltage[:] = 3.0
-    env = ElbowArmVectorEnv(1, duration=0.1, start_noise=0.0)
-    observation, _ = env.reset(seed=0)
-    action, _ = TimeVaryingLQR(env, trajectory).predict(observation)
-    np.testing.assert_allclose(action, 3.0 / 24.0, atol=1e-6)
-
-
-def test_lqr_gains_after_the_last_period_only_weigh_the_last_cost(arm):
-    settings = Settings(duration=0.1)
-    assert lqr_gains(settings, resting(arm)).shape == (5, 10, 30)
-    with pytest.raises(ValueError, match="trajectory must have 250 control periods, got 5"):
-        TimeVaryingLQR(ElbowArmVectorEnv(1), resting(arm))
 
 
 @pytest.fixture(scope="module")
@@ -142,17 +86,3 @@ def test_an_impossible_problem_is_said_to_have_failed(short):
         solve(
             program, Trajectory(**{**vars(solution.trajectory), "voltage": solution.trajectory.voltage * 0}), max_iter=1
         )
-
-
-def test_a_result_of_another_problem_is_not_taken_over(arm, tmp_path):
-    cell = Cell(2)
-    card, trajectory = files(cell, tmp_path)
-    resting(arm).save(trajectory)
-    for question, expected in ((cell.question, {"cost": 1.0}), ({**cell.question, "duration": 4.0}, None)):
-        card.write_text(json.dumps({"problem": question, "figures": {"cost": 1.0}}))
-        assert cached(cell, tmp_path) == expected
-
-
-def test_cells_have_names_of_their_own():
-    names = [cell.name for cell in cells()]
-    assert len(set(names)) == len(names)
