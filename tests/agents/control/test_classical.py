@@ -1,10 +1,13 @@
 """The classical controllers do what their names say, seen through the environment alone."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from agents.control.classical import COMPUTED, ComputedTorque, GravityPD, Reference, economical_pose
+from agents.control import classical
+from agents.control.classical import COMPUTED, GravityPD, Reference, economical_pose
 from agents.control.minimum_jerk import minimum_jerk
 from agents.control.pd import CLIPPED
 from agents.control.posture import best_postures, static_copper_loss
@@ -78,8 +81,10 @@ def test_smooth_start_costs_less_than_the_step_and_is_there_sooner():
     assert figures["pd_smooth"]["error_mean"] < figures["pd"]["error_mean"]
 
 
-def test_economical_pose_keeps_the_elbows_down_and_costs_less_than_the_papers(arm):
+def test_economical_pose_keeps_the_elbows_down_and_costs_less_than_the_papers(arm, monkeypatch):
     elbows, circle = (4,), Circle()
+    # The first of its searches, from the paper's pose, is enough.
+    monkeypatch.setattr(classical, "best_postures", partial(best_postures, starts=1))
     pose = economical_pose(arm, elbows, circle)
     heights = joint_positions(arm, pose)[2:, 2]
     assert abs(heights[1]) < 1e-5
@@ -92,13 +97,16 @@ def test_economical_pose_keeps_the_elbows_down_and_costs_less_than_the_papers(ar
     assert mine < 0.75 * papers
 
 
-def test_controllers_are_independent_of_the_batch():
-    settings = Settings(duration=0.1, **COMPUTED)
-    env = ElbowArmVectorEnv(3, **settings.arguments)
+@pytest.mark.parametrize("name", ["pd", "pd_smooth", "pd_gravity", "computed_torque"])
+def test_controllers_are_independent_of_the_batch(name):
+    arguments, make = CLASSICAL[name]
+    env = ElbowArmVectorEnv(3, duration=0.1, **arguments)
     observation, _ = env.reset(seed=0)
-    together, _ = ComputedTorque(env).predict(observation)
-    alone, _ = ComputedTorque(env).predict(observation[1:2])
-    np.testing.assert_allclose(together[1:2], alone, atol=1e-4)
+    together, alone = make(env), make(env)
+    for _ in range(3):
+        action, _ = together.predict(observation)
+        np.testing.assert_allclose(action[1:2], alone.predict(observation[1:2])[0], rtol=1e-6, atol=1e-4)
+        observation, *_ = env.step(action)
 
 
 @pytest.mark.parametrize("elbows", [(), (4,), (4, 7)])
