@@ -1,4 +1,7 @@
-"""Small training runs; as a module, `python -m tests.support.trainings FOLDER ppo|sac`, one that is killed midway."""
+"""Small training runs.
+
+As a module, `python -m tests.support.trainings PPO_FOLDER SAC_FOLDER`, it starts two that are killed midway.
+"""
 
 import json
 import os
@@ -49,7 +52,22 @@ def die(keeper):
     return True
 
 
+def killed(run):
+    """The exit code of a process of its own in which a run is killed midway."""
+    process = os.fork()
+    if process == 0:
+        Keeper._on_step = die
+        train(run)
+        os._exit(0)
+    return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+
+
 if __name__ == "__main__":
-    Keeper._on_step = die
-    changes = SAC_KILLED if sys.argv[2] == "sac" else {}
-    train(small_run(Path(sys.argv[1]), checkpoint_seconds=0.0, **changes))
+    # Forked from here, both processes have what takes seconds to load, the last of it with the first optimizer.
+    import stable_baselines3  # noqa: F401
+    import torch.utils.tensorboard
+
+    torch.optim.Adam([torch.nn.Parameter(torch.zeros(1))])
+    ppo, sac = map(Path, sys.argv[1:])
+    for run in (small_run(ppo, checkpoint_seconds=0.0), small_run(sac, checkpoint_seconds=0.0, **SAC_KILLED)):
+        print(killed(run), flush=True)

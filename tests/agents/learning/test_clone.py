@@ -8,6 +8,7 @@ import pytest
 
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import OPTIMA, Trajectory
+from agents.learning import clone as cloning
 from agents.learning.clone import clone, clone_all
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.evaluation import evaluation
@@ -15,6 +16,7 @@ from agents.learning.publish import publish
 from agents.policy import load_policy
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
+from tests.support.workers import in_this_process
 
 PERIODS = 15
 SETTINGS = Settings(elbows=2, duration=PERIODS * 0.02)
@@ -49,6 +51,12 @@ def test_same_seed_gives_the_same_clone_bit_for_bit(beginning):
     assert twice[0].card.digest == twice[1].card.digest != other.card.digest
 
 
+@pytest.fixture
+def here(monkeypatch):
+    monkeypatch.setattr(cloning, "in_processes", in_this_process)
+
+
+@pytest.mark.usefixtures("here")
 def test_run_of_a_clone_can_be_published_and_loaded(tmp_path, beginning):
     beginning.save(tmp_path / "beginning.npz")
     folder = tmp_path / "clone_elbows2_seed5"
@@ -64,6 +72,7 @@ def test_run_of_a_clone_can_be_published_and_loaded(tmp_path, beginning):
         clone_all(SETTINGS, tmp_path / "nothing.npz", SMALL, [6], [tmp_path / "other"], "command")
 
 
+@pytest.mark.usefixtures("here")
 def test_resumed_clones_leave_finished_seeds_alone(tmp_path, beginning):
     beginning.save(tmp_path / "beginning.npz")
     seeds, folders = [5, 6], [tmp_path / "five", tmp_path / "six"]

@@ -74,15 +74,19 @@ def test_card_tells_how_it_was_made(done):
     assert np.isfinite(card["evaluation"]["return"])
 
 
-def kill(folder, algorithm):
-    command = [sys.executable, "-m", "tests.support.trainings", str(folder), algorithm]
-    killed = subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
-    assert killed.returncode == -signal.SIGKILL, killed.stderr
+@pytest.fixture(scope="module")
+def killed(tmp_path_factory):
+    """The folders of two runs that were killed with SIGKILL midway, by algorithm."""
+    folders = {name: tmp_path_factory.mktemp("killed") / name for name in ("ppo", "sac")}
+    command = [sys.executable, "-m", "tests.support.trainings", *map(str, folders.values())]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert ended.stdout.splitlines().count(str(-signal.SIGKILL)) == 2, ended.stderr
+    return folders
 
 
-def test_killed_run_goes_on_to_the_same_policy(done, tmp_path):
-    folder = tmp_path / "run"
-    kill(folder, "ppo")
+@pytest.mark.slow
+def test_killed_run_goes_on_to_the_same_policy(done, killed):
+    folder = killed["ppo"]
     assert [path.name for path in checkpoints(folder)] == ["checkpoint_000000000512"]
     result = train(small_run(folder), resume=True)
     assert result["finished"]
@@ -129,6 +133,7 @@ def test_minutes_end_a_run(tmp_path):
     assert result["steps"] < 1024
 
 
+@pytest.mark.slow
 def test_seeds_in_processes_train_what_they_train_alone(done, tmp_path):
     runs = [small_run(tmp_path / f"seed{seed}", seed=seed) for seed in (0, 1)]
     results = train_all(runs, workers=2)
@@ -159,10 +164,10 @@ def test_first_policy_is_where_the_training_starts(done, tmp_path):
         train(wrong)
 
 
-def test_killed_sac_goes_on_to_the_same_policy(tmp_path):
-    whole, cut = small_run(tmp_path / "whole", **SAC_KILLED), small_run(tmp_path / "cut", **SAC_KILLED)
+@pytest.mark.slow
+def test_killed_sac_goes_on_to_the_same_policy(killed, tmp_path):
+    whole, cut = small_run(tmp_path / "whole", **SAC_KILLED), small_run(killed["sac"], **SAC_KILLED)
     train(whole)
-    kill(cut.folder, "sac")
     assert [path.name for path in checkpoints(cut.folder)] == ["checkpoint_000000000600"]
     assert train(cut, resume=True)["finished"]
     columns = [[row[:1] + row[3:] for row in evaluations(run.folder)] for run in (whole, cut)]

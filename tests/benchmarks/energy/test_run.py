@@ -18,6 +18,7 @@ from benchmarks.energy.cells import Cell
 from benchmarks.energy.statistics import interquartile_mean
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
+from tests.support.workers import in_this_process
 
 STYLES = (CONTROLLER_COLOURS, CONTROLLER_NAMES, CONTROLLER_MARKERS)
 
@@ -115,8 +116,9 @@ def test_progress_tells_all_of_the_work_once(measured, tmp_path):
         assert sum(told) == lineup.work(QUICK[0])
 
 
-def test_cells_in_processes_are_those_played_here(measured, monkeypatch):
+def test_cells_sent_to_processes_are_those_played_here(measured, monkeypatch):
     folder, rows = measured
+    monkeypatch.setattr(energy, "in_processes", in_this_process)
     monkeypatch.setattr(energy, "cells", lambda: QUICK[:1])
     monkeypatch.setattr(energy, "sweep", list)
     assert energy.measure([20_000, 20_001], lambda _: None, folder / "other") == rows[:3]
