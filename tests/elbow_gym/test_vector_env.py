@@ -59,7 +59,7 @@ def test_make_vec_gives_the_native_batch():
 
 @pytest.mark.parametrize("start", ["paper", "on_target"])
 @pytest.mark.parametrize("elbows", [0, 1, 2])
-@pytest.mark.parametrize("num_envs", [1, 2, 5, 16, 33])
+@pytest.mark.parametrize("num_envs", [1, 2, 5, 17])
 def test_batch_equals_single_environments_bit_for_bit_across_autoresets(num_envs, elbows, start):
     settings = {**RANDOM, "elbows": elbows, "start": start}
     singles = [ElbowArmEnv(**settings) for _ in range(num_envs)]
@@ -211,13 +211,13 @@ def test_wrong_call_is_an_error_that_leaves_everything_untouched(call, arguments
     assert same(env.get_state(), before)
 
 
-def test_simulator_gets_contiguous_volts_whatever_the_actions_memory_order(monkeypatch):
-    env = ElbowArmVectorEnv(3)
-    env.reset(seed=0)
-    layouts = []
-    monkeypatch.setattr(env.episodes.simulator, "advance", lambda volts, *_: layouts.append(volts.flags.c_contiguous))
-    env.step(np.asfortranarray(actions(3, 1)[0]))
-    assert layouts == [True]
+@pytest.mark.parametrize("order", [np.asfortranarray, lambda action: np.repeat(action, 2, axis=1)[:, ::2], np.float64])
+def test_neither_memory_order_nor_precision_of_the_actions_changes_a_bit(order):
+    env, twin = ElbowArmVectorEnv(3), ElbowArmVectorEnv(3)
+    for one in (env, twin):
+        one.reset(seed=0)
+    for action in actions(3, 3):
+        assert same(env.step(order(action)), twin.step(action))
 
 
 @pytest.mark.parametrize("mode", MODES)
