@@ -270,4 +270,6 @@ def test_a_running_state_can_be_given_back():
     rng = np.random.default_rng(0)
     for _ in range(50):
         sim.step(24.0 * rng.choice([-1.0, 1.0], 10), 10)
+    running = [values.copy() for values in (sim.q, sim.q_dot, sim.current)]
     sim.reset(sim.q, sim.q_dot, sim.current)
+    np.testing.assert_array_equal([sim.q, sim.q_dot, sim.current], running)

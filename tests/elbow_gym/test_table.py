@@ -14,12 +14,6 @@ def test_a_table_is_none_the_default_a_dict_or_itself():
     assert as_table({"friction": 0.3, "stiffness": 2e4}) == as_table(table) == table
 
 
-def test_the_default_table_is_the_prototypes():
-    assert TableParameters().to_dict() == {
-        "stiffness": 1e5, "dissipation": 0.5, "friction": 0.0, "friction_velocity": 0.01
-    }  # fmt: skip
-
-
 def test_table_survives_json():
     table = TableParameters(stiffness=3e5, dissipation=0.0, friction=0.7, friction_velocity=0.02)
     assert as_table(json.loads(json.dumps(table.to_dict()))) == table

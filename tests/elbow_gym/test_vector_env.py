@@ -9,7 +9,7 @@ from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
-from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv
+from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, kernel
 
 MODES = list(AutoresetMode)
 RESETTING = [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP]
@@ -212,12 +212,15 @@ def test_wrong_call_is_an_error_that_leaves_everything_untouched(call, arguments
 
 
 @pytest.mark.parametrize("order", [np.asfortranarray, lambda action: np.repeat(action, 2, axis=1)[:, ::2], np.float64])
-def test_neither_memory_order_nor_precision_of_the_actions_changes_a_bit(order):
+def test_neither_memory_order_nor_precision_of_the_actions_changes_a_bit_or_has_anything_compiled(order):
     env, twin = ElbowArmVectorEnv(3), ElbowArmVectorEnv(3)
     for one in (env, twin):
         one.reset(seed=0)
-    for action in actions(3, 3):
-        assert same(env.step(order(action)), twin.step(action))
+    expected = [twin.step(action) for action in actions(3, 3)]
+    compiled = [kernel.drive, kernel.kernel(kernel.BLOCK_LANES).advance]
+    before = [entry.signatures for entry in compiled]
+    assert same([env.step(order(action)) for action in actions(3, 3)], expected)
+    assert [entry.signatures for entry in compiled] == before
 
 
 @pytest.mark.parametrize("mode", MODES)

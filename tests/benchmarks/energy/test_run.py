@@ -16,6 +16,7 @@ from benchmarks.energy import cells as lineup
 from benchmarks.energy import run as energy
 from benchmarks.energy.cells import Cell
 from benchmarks.energy.statistics import interquartile_mean
+from elbow_gym.simulation.options import TABLE_TIMESTEP
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 from tests.support.workers import in_this_process
@@ -156,13 +157,15 @@ def test_lineup_finds_what_is_shipped(monkeypatch):
     assert all(name in style for cell in everyone for name in [cell.controller] for style in STYLES)
 
 
-def test_table_part_is_played_on_the_table_and_the_random_policy_off_it():
+def test_table_part_is_played_on_the_table_and_a_gain_multiplies_both_of_the_papers():
     [player] = lineup.contenders(Cell("pd_24v", 0, "table"))
     assert player.settings.table is True
     assert player.settings.elbows == 0
+    assert player.settings.timestep <= TABLE_TIMESTEP
     [player] = lineup.contenders(Cell("pd_24v", 1, gain=4.0))
     controller = player.make(ElbowArmVectorEnv(1, **player.settings.arguments))
     assert (controller.kp, controller.kd) == (4.0 * 500.0, 4.0 * 20.0)
+    assert player.settings.table is False
 
 
 def test_gain_family_runs_from_soft_to_stiff(tmp_path):

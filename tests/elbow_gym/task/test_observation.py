@@ -91,7 +91,6 @@ def test_decode_takes_one_arm_or_many():
 
 
 def test_lookahead_is_the_error_to_the_target_a_tenth_of_a_second_later():
-    assert task.LOOKAHEAD == 0.1
     seen = LAYOUT.decode(look(arms()).observation)
     moved = seen["hand_error"] - seen["lookahead_error"]
     np.testing.assert_allclose(
