@@ -20,6 +20,7 @@ from agents.learning.train import train, train_all
 from agents.learning.training_env import MeteredVectorEnv
 from agents.policy import load_policy
 from tests.support.trainings import SAC_KILLED, SAC_SMALL, SMALL, small_run
+from tests.support.workers import PoolHere
 
 ROOT = Path(__file__).parents[3]
 
@@ -133,16 +134,28 @@ def test_minutes_end_a_run(tmp_path):
     assert result["steps"] < 1024
 
 
-@pytest.mark.slow
-def test_seeds_in_processes_train_what_they_train_alone(done, tmp_path):
-    runs = [small_run(tmp_path / f"seed{seed}", seed=seed) for seed in (0, 1)]
+def assert_seeds_train_what_they_train_alone(done, folder):
+    runs = [small_run(folder / f"seed{seed}", seed=seed) for seed in (0, 1)]
     results = train_all(runs, workers=2)
     assert [result["name"] for result in results] == ["seed0", "seed1"]
     for name, alone in weights(done[0].folder).items():
-        np.testing.assert_array_equal(weights(tmp_path / "seed0")[name], alone)
-    assert any((weights(tmp_path / "seed1")[name] != alone).any() for name, alone in weights(done[0].folder).items())
+        np.testing.assert_array_equal(weights(folder / "seed0")[name], alone)
+    assert any((weights(folder / "seed1")[name] != alone).any() for name, alone in weights(done[0].folder).items())
+
+
+def test_seeds_sent_to_processes_train_what_they_train_alone(done, tmp_path, monkeypatch):
+    monkeypatch.setattr("agents.learning.train.ProcessPoolExecutor", PoolHere)
+    assert_seeds_train_what_they_train_alone(done, tmp_path)
+
+
+@pytest.mark.soak
+def test_seeds_in_processes_train_what_they_train_alone(done, tmp_path):
+    assert_seeds_train_what_they_train_alone(done, tmp_path)
+
+
+def test_workers_must_be_positive(tmp_path):
     with pytest.raises(ValueError, match="workers must be positive, got 0"):
-        train_all(runs, workers=0)
+        train_all([small_run(tmp_path / "run")], workers=0)
 
 
 def test_orphan_stops(monkeypatch, tmp_path):
