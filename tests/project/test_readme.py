@@ -1,0 +1,69 @@
+"""The README's snippets run, its table is the committed one, and what it names exists."""
+
+import re
+import runpy
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+SNIPPETS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_readme_has_its_snippets():
+    assert len(SNIPPETS) == 4
+
+
+@pytest.mark.parametrize("snippet", SNIPPETS)
+def test_readme_snippet_runs(snippet):
+    exec(compile(snippet, "README.md", "exec"), {"__name__": "readme"})
+
+
+def test_energy_table_is_the_committed_one():
+    table = README.split("<!-- energy -->\n")[1].split("<!-- /energy -->")[0]
+    assert table == (ROOT / "benchmarks/results/energy_brief.md").read_text(encoding="utf-8")
+
+
+def test_breakdown_in_the_benchmarks_readme_is_the_committed_one():
+    page = (ROOT / "benchmarks/README.md").read_text(encoding="utf-8")
+    table = page.split("<!-- breakdown -->\n")[1].split("<!-- /breakdown -->")[0]
+    assert table == (ROOT / "benchmarks/results/breakdown.md").read_text(encoding="utf-8")
+
+
+def test_learning_table_in_the_benchmarks_readme_is_the_committed_one():
+    page = (ROOT / "benchmarks/README.md").read_text(encoding="utf-8")
+    table = page.split("<!-- learning -->\n")[1].split("<!-- /learning -->")[0]
+    assert table == (ROOT / "benchmarks/results/learning.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("path", re.findall(r"!\[[^]]*\]\(([^)]+)\)|`((?:tests|benchmarks|agents)/[\w./]+)`", README))
+def test_files_that_the_readme_names_exist(path):
+    assert (ROOT / (path[0] or path[1])).exists()
+
+
+@pytest.mark.parametrize("name", re.findall(r"`((?:dynamics|kinematics|circle)\.(?!py`)\w+)`", README))
+def test_functions_that_the_readme_names_exist(name):
+    module, attribute = name.split(".")
+    assert callable(getattr(import_module(f"elbow_gym.{module}"), attribute))
+
+
+COMMANDS = sorted(set(re.findall(r"python -m (agents|benchmarks) (\w+)", README)))
+
+
+def test_readme_names_commands_of_both_packages():
+    assert {("agents", "reproduce"), ("agents", "train"), ("benchmarks", "energy")} <= set(COMMANDS)
+
+
+@pytest.mark.parametrize(("package", "command"), COMMANDS)
+def test_commands_that_the_readme_names_have_help(package, command, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", [package, command, "--help"])
+    with pytest.raises(SystemExit) as ended:
+        # As `python -m` does; in this process, whose libraries are loaded.
+        runpy.run_path(str(ROOT / package / "__main__.py"), run_name="__main__")
+    assert ended.value.code == 0
+    told = capsys.readouterr().out
+    assert "usage" in told
+    assert command in told
