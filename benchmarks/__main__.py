@@ -7,25 +7,30 @@ from pathlib import Path
 import tyro
 
 from agents.cli import run
-from benchmarks.machine import RESULTS
+from benchmarks.machine import LATEST, RESULTS
 
 app = tyro.extras.SubcommandApp()
 
 
 @app.command
-def energy(output: Path = RESULTS, episodes: int = 20, fresh: bool = False) -> None:
-    """Every controller in the regimes A, B and C: tables, CSV, JSON and figures.
+def energy(
+    output: Path = LATEST, episodes: int | None = None, fresh: bool = False, full: bool = False, publish: bool = False
+) -> None:
+    """Energy and error of every controller with two, one and no elbow on the table, in the regimes A, B and C.
 
-    An interrupted run goes on where it stopped: what was measured with the same code and files is not measured again.
+    By default three start poses and one policy of each learned controller, in about a minute of CPU time. An
+    interrupted run goes on where it stopped: what was measured with the same code and files is not measured again.
 
     Args:
-        output: folder for the results.
-        episodes: start poses, one fixed seed each.
+        output: folder for the tables and figures.
+        episodes: start poses, one fixed seed each; 3, or 20 of a full run, when not given.
         fresh: measure everything again.
+        full: all parts, start poses and training seeds.
+        publish: a full run whose results go to benchmarks/results and into the tables of the READMEs.
     """
     from benchmarks.energy.run import energy as measure_energy
 
-    measure_energy(output, episodes, fresh)
+    measure_energy(output, episodes, fresh, full, publish)
 
 
 @app.command

@@ -7,6 +7,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 RESULTS = Path(__file__).parent / "results"
+"""Folder of the tracked results."""
+CACHE = Path(__file__).parents[1] / ".benchmarks" / "energy"
+"""Folder of the energy benchmark's results, cell by cell; ignored by git."""
+LATEST = CACHE / "latest"
+"""Folder of the energy benchmark's last run that was not published; ignored by git."""
 PACKAGES = ("elbow-gym", "gymnasium", "numpy", "numba", "scipy", "stable-baselines3", "torch")
 VECTORS = {
     "avx512f": "AVX-512, 8 doubles",
