@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -56,6 +57,7 @@ def vectors() -> str:
     return next((name for feature, name in VECTORS.items() if features.get(feature)), "")
 
 
+@cache
 def _version(name: str) -> str | None:
     try:
         return version(name)
