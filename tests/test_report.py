@@ -11,16 +11,15 @@ import numpy as np
 import pytest
 from browser import chromium, emulate, keep_picture
 
+from agents.evaluation import players
 from agents.evaluation.metrics import metrics
-from agents.evaluation.players import CLASSICAL
+from agents.evaluation.players import CLASSICAL, Entry, entries
 from agents.evaluation.recording import Recording
 from agents.paper.cases import measure, settings_of
 from agents.paper.figures import write_series
 from agents.report import colours, command, payload
-from agents.report import roster as lineup
 from agents.report.command import RESULTS
 from agents.report.page import page
-from agents.report.roster import Entry, roster
 from agents.report.runs import Run, play
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, ELBOW_COLOURS
 from benchmarks.energy import pareto
@@ -70,11 +69,11 @@ def made_up(controller, elbows, start):
 def runs():
     """The paper's cases, made up, and PPO's two runs as they are."""
     paper = [made_up("pd_paper", elbows, start) for elbows in (2, 1, 0) for start in ("paper", "on_target")]
-    clipped = [made_up("pd_24v", elbows, "paper") for elbows in (2, 1, 0)]
+    clipped = [made_up("pd", elbows, "paper") for elbows in (2, 1, 0)]
     told = []
     entry = Entry("ppo", 2)
     learned = play(entry, told.append)
-    assert sum(told) == entry.size
+    assert sum(told) == 2 * entry.player().work
     return [*paper, *clipped, *learned]
 
 
@@ -189,14 +188,13 @@ def test_colours_can_be_told_from_the_page(background):
 
 
 def test_every_controller_of_the_benchmark_is_played(tmp_path, monkeypatch):
-    assert {entry.elbows for entry in roster() if entry.name == "lqr"} == {2, 1, 0}
-    monkeypatch.setattr(lineup, "OPTIMA", tmp_path)
-    expected = {(name, elbows) for name in CLASSICAL for elbows in (2, 1, 0)}
-    assert {(entry.name, entry.elbows) for entry in roster()} >= expected
-    assert not [entry for entry in roster() if entry.name == "lqr"]
+    expected = {(name, elbows) for name in (*CLASSICAL, "lqr") for elbows in (2, 1, 0)}
+    assert {(entry.name, entry.elbows) for entry in entries()} >= expected
+    monkeypatch.setattr(players, "OPTIMA", tmp_path)
+    assert not [entry for entry in entries() if entry.name == "lqr"]
 
 
-def test_policies_are_played_where_they_were_trained(tmp_path, monkeypatch):
+def test_policies_are_played_where_they_were_trained(monkeypatch):
     shipped = [
         "ppo_elbows1_seed0",
         "ppo_elbows1_seed3",
@@ -204,18 +202,17 @@ def test_policies_are_played_where_they_were_trained(tmp_path, monkeypatch):
         "ppo_random_seed0",
         "sac_table_seed2",
     ]
-    monkeypatch.setattr(lineup, "shipped_policies", lambda: shipped)
-    monkeypatch.setattr(lineup, "OPTIMA", tmp_path)
-    learned = [entry for entry in roster() if entry.name not in CLASSICAL]
-    assert [(entry.controller, entry.bearing, entry.env) for entry in learned] == [
+    monkeypatch.setattr(players, "shipped_policies", lambda: shipped)
+    learned = [entry for entry in entries() if entry.name not in (*CLASSICAL, "lqr")]
+    assert [(entry.name, entry.bearing, entry.env) for entry in learned] == [
         ("ppo", "1", "ElbowArm-v0"),
-        ("ppo_random", "2", "ElbowArmRandom-v0"),
+        ("ppo_random", "2", "ElbowArm-v0"),
         ("sac_cloned", "0", "ElbowArm-v0"),
         ("sac", "table", "ElbowArmTable-v0"),
     ]
-    beside = [entry for entry in roster() if entry.bearing == "table" and entry.name in CLASSICAL]
+    beside = [entry for entry in entries() if entry.bearing == "table" and entry.name in CLASSICAL]
     assert {entry.name for entry in beside} == set(CLASSICAL) - {"pd_paper"}
-    assert all(entry.contender()[0].table for entry in beside)
+    assert all(entry.player().settings.table for entry in beside)
 
 
 def test_every_marker_has_its_drawing(document):
@@ -225,7 +222,7 @@ def test_every_marker_has_its_drawing(document):
 
 
 def test_the_command_writes_the_file_whole_or_not_at_all(runs, document, tmp_path, monkeypatch):
-    monkeypatch.setattr(command, "collect", lambda entries, progress: progress(1) or runs)
+    monkeypatch.setattr(command, "collect", lambda entries: runs)
     assert command.report(tmp_path / "all" / "report.html").read_text(encoding="utf-8") == document
 
     def broken(*_):
@@ -401,3 +398,23 @@ def test_it_fits_the_screen_in_both_schemes(opened, width, scheme):
     brightness = np.mean([int(channel) for channel in re.findall(r"\d+", ground)[:3]])
     assert (brightness > 128) == (scheme == "light")
     keep_picture(opened, f"report_{width}_{scheme}.png")
+
+
+def test_the_benchmarks_table_fits_1280_pixels_with_every_row_and_its_lines_run_through(opened):
+    opened.execute_script(
+        "for (const filter of document.querySelectorAll('#filters select')) {"
+        "  if (filter.name !== 'set') filter.value = '';"
+        "  filter.dispatchEvent(new Event('change'));"
+        "}"
+    )
+    frame, table, rows = opened.execute_script(
+        "const frame = document.querySelector('#benchmark .scroll');"
+        "const rows = [...frame.querySelectorAll('tbody tr:not([hidden])')];"
+        "const edge = cell => [getComputedStyle(cell).borderTopWidth, cell.getBoundingClientRect().top];"
+        "return [frame.clientWidth, frame.scrollWidth, rows.map(row => [edge(row.cells[0]), edge(row.cells[1])])];"
+    )
+    assert table <= frame
+    assert len(rows) > 50
+    for first, second in rows:
+        assert first == second
+        assert first[0] == "1px"
