@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -110,5 +109,6 @@ def report(rows: Sequence[Row], poses: int, every_seed: bool, written: Sequence[
 
 
 def _short(path: Path) -> str:
-    """The path from here, where that is shorter."""
-    return min(os.path.relpath(path), str(path), key=len)
+    """The path from here, if it is below."""
+    here = Path.cwd()
+    return str(path.relative_to(here) if path.is_relative_to(here) else path)

@@ -90,6 +90,11 @@ def test_report_ends_with_where_the_files_are(tmp_path):
     assert "interquartile mean over 3 start poses" in " ".join(text.split())
 
 
+def test_files_below_the_working_folder_are_named_from_there(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "Files: out/latest (energy.csv" in report(rows(["pd"]), 3, False, [tmp_path / "out" / "latest"])
+
+
 def test_short_table_has_a_row_for_each_featured_controller_alone():
     lines = short(rows([*FEATURED, "clone", "pd_smooth"])).splitlines()
     assert len(lines) == 2 + len(FEATURED) <= 2 + 8
