@@ -85,17 +85,19 @@ def evaluate(
     """
     from tqdm import tqdm
 
-    from agents.evaluation.players import BENCHMARK_SEEDS, in_all_regimes, named_controller, print_results
+    from agents.evaluation.players import find_player
+    from agents.evaluation.regimes import BENCHMARK_SEEDS, in_all_regimes, print_results
 
-    settings, make = named_controller(policy, elbows, env)
+    player = find_player(policy, elbows, env)
     seeds = [BENCHMARK_SEEDS[0] + k for k in range(episodes)]
-    with tqdm(total=200, unit="%", desc=policy, file=sys.stderr) as bar:
+    with tqdm(total=100, unit="%", desc=policy, file=sys.stderr) as bar:
 
         def advance(done: int, total: int) -> None:
-            bar.update(1)
+            bar.update(100 * done // total - bar.n)
 
-        results = in_all_regimes(settings, make, seeds, advance)
-    print_results(f"{policy}, elbows {settings.elbow_joints}, {episodes} episodes: mean ± standard deviation", results)
+        results = in_all_regimes(player, seeds, advance)
+    elbow_joints = player.settings.elbow_joints
+    print_results(f"{player.label}, elbows {elbow_joints}, {episodes} episodes: mean ± standard deviation", results)
 
 
 @app.command

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 DPI = 160
@@ -10,7 +11,7 @@ ELBOW_COLOURS = {2: "#0072B2", 1: "#E69F00", 0: "#D55E00"}
 ELBOW_NAMES = {2: "two elbows", 1: "one elbow", 0: "no elbow"}
 CONTROLLER_COLOURS = {
     "pd_paper": "#D55E00",
-    "pd_24v": "#E69F00",
+    "pd": "#E69F00",
     "pd_smooth": "#F0E442",
     "pd_gravity": "#CC79A7",
     "computed_torque": "#56B4E9",
@@ -26,7 +27,7 @@ CONTROLLER_COLOURS = {
 }
 CONTROLLER_NAMES = {
     "pd_paper": "PD, no limit",
-    "pd_24v": "PD, 24 V",
+    "pd": "PD, 24 V",
     "pd_smooth": "PD, smooth start",
     "pd_gravity": "PD + gravity",
     "computed_torque": "computed torque",
@@ -42,7 +43,7 @@ CONTROLLER_NAMES = {
 }
 CONTROLLER_MARKERS = {
     "pd_paper": "v",
-    "pd_24v": "^",
+    "pd": "^",
     "pd_smooth": "s",
     "pd_gravity": "D",
     "computed_torque": "o",
@@ -56,6 +57,15 @@ CONTROLLER_MARKERS = {
     "sac_cloned": "p",
     "sac_random": "H",
 }
+
+
+def look(name: str) -> tuple[str, str, str]:
+    """A controller's name for readers, its colour #rrggbb and its marker; black and a disc where it has none here."""
+    return (
+        CONTROLLER_NAMES.get(name, Path(name).name),
+        CONTROLLER_COLOURS.get(name, "#000000"),
+        CONTROLLER_MARKERS.get(name, "o"),
+    )
 
 
 def pyplot() -> Any:

@@ -1,17 +1,98 @@
-"""Long jobs in processes of their own, side by side, with one stream of progress."""
+"""Long jobs in processes of their own, side by side, with one stream of progress; and what must happen before."""
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
-from collections.abc import Callable, Mapping
+import sys
+import threading
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
-from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, Generic, TextIO, TypeVar
+
+from elbow_gym.task.settings import Settings
+
+BATCH = 16
+"""Arms of an environment whose number does not matter, as long as it is no single arm's kernel that steps them."""
+PATIENCE = 2.0
+"""Time after which a compilation is announced [s]."""
+COMPILE_SECONDS = 15
+"""About the time that one kernel takes to compile [s]."""
+WITHOUT_KERNEL: dict[str, Any] = {
+    "control_frequency": 50.0,
+    "timestep": None,
+    "voltage_limit": 24.0,
+    "action_unit": "fraction",
+    "start": "paper",
+    "start_noise": 0.0,
+}
+"""Arguments of an environment that no kernel depends on, as `compile_before` sets them."""
 
 T = TypeVar("T")
 Tell = Callable[[int], Any]
 """Told the units of work done since it was last told."""
+
+
+class _WithoutNotice:
+    """A stream without the kernel's own notices that it compiles."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream, self._dropped = stream, False
+
+    def write(self, text: str) -> int:
+        """Passes text on, unless it is a notice or the end of its line."""
+        drop = text.startswith("elbow_gym: compiling") or (self._dropped and text == "\n")
+        self._dropped = drop and text != "\n"
+        return len(text) if drop else self._stream.write(text)
+
+    def flush(self) -> None:
+        """Flushes the stream behind."""
+        self._stream.flush()
+
+
+def compile_before(batches: Iterable[Settings | tuple[Settings, int]]) -> None:
+    """Has the kernels compiled that environments will need, here and one after the other, before processes start.
+
+    Otherwise each process would compile the same kernel at the same time. Nothing is compiled or said when Numba's
+    cache has them; one line on stderr says about how long it takes when it has not.
+
+    Args:
+        batches: settings of the environments, each alone or with the number of arms side by side; alone they stand for
+            a batch. Up to two arms have another kernel than more.
+    """
+    import numpy as np
+
+    from elbow_gym.vector_env import ElbowArmVectorEnv
+
+    wanted: list[tuple[Settings, int]] = []
+    for batch in batches:
+        settings, arms = (batch, BATCH) if isinstance(batch, Settings) else batch
+        alike = replace(settings, **WITHOUT_KERNEL), arms
+        if alike not in wanted:
+            wanted.append(alike)
+    kernels = {(settings.table is False, arms <= 2) for settings, arms in wanted}
+    notice = f"Compiling the kernel for this machine, once: about {COMPILE_SECONDS * len(kernels)} s of CPU time."
+    said = threading.Event()
+
+    def say() -> None:
+        if not said.is_set():
+            said.set()
+            print(notice, file=stream, flush=True)
+
+    stream = sys.stderr
+    with contextlib.redirect_stderr(_WithoutNotice(stream)):
+        for settings, arms in wanted:
+            timer = threading.Timer(PATIENCE, say)
+            timer.daemon = True
+            timer.start()
+            try:
+                env = ElbowArmVectorEnv(arms, **settings.arguments)
+                env.reset(seed=0)
+                env.step(np.zeros((arms, settings.parsed_arm.n_joints), dtype=np.float32))
+            finally:
+                timer.cancel()
 
 
 @dataclass(frozen=True)
@@ -20,6 +101,19 @@ class Job(Generic[T]):
 
     work: Callable[[Tell], T]
     size: int
+
+
+def counted(size: int, tell: Tell) -> Callable[[int, int], None]:
+    """A callback with the steps done and in all that tells the units, of `size` in all, since its last call."""
+    told = 0
+
+    def progress(done: int, total: int) -> None:
+        nonlocal told
+        reached = size * done // total
+        tell(reached - told)
+        told = reached
+
+    return progress
 
 
 _parent: Any = None

@@ -94,7 +94,7 @@ def _pd_rows(results: Path) -> dict[tuple[str, str], dict[str, str]]:
         if path.is_file():
             with path.open(newline="", encoding="utf-8") as handle:
                 for row in csv.DictReader(handle):
-                    if row["controller"] == "pd_24v":
+                    if row["controller"] == "pd":
                         task = "table" if stem == "energy_table" else f"elbows{row['elbows']}"
                         found[task, row["regime"]] = row
     return found
@@ -165,7 +165,7 @@ def figure(curves: Sequence[Curve], results: Path, path: Path) -> None:
 def _mark(ax: Any, task: str, papers: Mapping[tuple[str, str], Mapping[str, str]]) -> None:
     if (task, "A") in papers:
         level = -float(papers[task, "A"]["return [-]"])
-        ax.axhline(level, color=CONTROLLER_COLOURS["pd_24v"], ls="--", label=CONTROLLER_NAMES["pd_24v"])
+        ax.axhline(level, color=CONTROLLER_COLOURS["pd"], ls="--", label=CONTROLLER_NAMES["pd"])
     best = cached(Cell(int(task.removeprefix("elbows")), "paper")) if task.startswith("elbows") else None
     if best is not None:
         ax.axhline(float(best["closed_loop"]), color="black", ls=":", label="optimal bound")

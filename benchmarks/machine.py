@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import platform
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 RESULTS = Path(__file__).parent / "results"
+"""Folder of the tracked results."""
+CACHE = Path(__file__).parents[1] / ".benchmarks" / "energy"
+"""Folder of the energy benchmark's results, cell by cell; ignored by git."""
+LATEST = CACHE / "latest"
+"""Folder of the energy benchmark's last run that was not published; ignored by git."""
 PACKAGES = ("elbow-gym", "gymnasium", "numpy", "numba", "scipy", "stable-baselines3", "torch")
 VECTORS = {
     "avx512f": "AVX-512, 8 doubles",
@@ -51,6 +57,7 @@ def vectors() -> str:
     return next((name for feature, name in VECTORS.items() if features.get(feature)), "")
 
 
+@cache
 def _version(name: str) -> str | None:
     try:
         return version(name)

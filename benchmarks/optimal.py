@@ -20,6 +20,7 @@ from agents.files import write_csv, write_text
 from agents.optimal.bound import Optimum, SolveError, optimum, posture_guesses
 from agents.optimal.collocation import Problem
 from agents.shipped import OPTIMA
+from agents.workers import compile_before
 from benchmarks.machine import machine, versions
 from elbow_gym.task.settings import Settings
 
@@ -151,6 +152,9 @@ def run_cells(todo: Sequence[Cell], optima: Path, workers: int) -> dict[str, str
     # Small dense algebra: threads of two workers' BLAS would only get in each other's way.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    if todo:
+        # A solution is played by one arm; the LQR around it finds its gains with a batch.
+        compile_before([(Settings(), 1), Settings()])
     with tqdm(total=len(todo), file=sys.stderr, unit="cell") as bar, ProcessPoolExecutor(workers, context) as pool:
         # The front and what may go under the table start from the bound of their elbow count, so they wait for that.
         waiting = [cell for cell in todo if cell.parent in todo]

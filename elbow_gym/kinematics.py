@@ -44,11 +44,11 @@ def elbow_heights(arm: ArmParameters, q: ArrayLike, elbows: Sequence[int]) -> Ar
 
 
 def constraint_jacobian(arm: ArmParameters, q: ArrayLike, elbows: Sequence[int]) -> Array:
-    """J_c = dC/dq [m/rad], shape (p, n): raising joint j pitches every link from j to the elbow.   Eq. 17."""
+    """J_c = dC/dq [m/rad], shape (..., p, n): raising joint j pitches every link from j to the elbow.   Eq. 17."""
     slope = -arm.of_links("length") * np.sin(pitches(q))
-    jacobian = np.zeros((len(elbows), arm.n_joints))
+    jacobian = np.zeros((*slope.shape[:-1], len(elbows), arm.n_joints))
     for row, elbow in enumerate(elbows):
-        jacobian[row, 1 : elbow - 1] = np.cumsum(slope[1 : elbow - 1][::-1])[::-1]
+        jacobian[..., row, 1 : elbow - 1] = np.cumsum(slope[..., 1 : elbow - 1][..., ::-1], axis=-1)[..., ::-1]
     return jacobian
 
 
@@ -73,6 +73,79 @@ def constraint_bias(arm: ArmParameters, q: ArrayLike, q_dot: ArrayLike, elbows: 
     return np.array([centripetal[1 : elbow - 1].sum() for elbow in elbows])
 
 
+class HandPlacement:
+    """Joint angles and rates that put the hand on targets by joints 1, n-1 and n alone.   Eq. 29.
+
+    For whoever asks for many targets in turn; `inverse_kinematics` asks once.
+
+    Args:
+        arm: the arm.
+        pose: angles [rad], shape (n,), that joints 2..n-2 keep.
+    """
+
+    def __init__(self, arm: ArmParameters, pose: ArrayLike) -> None:
+        length = arm.of_links("length")
+        self._pose = np.array(pose, dtype=np.float64)
+        phi = pitches(self._pose)
+        # Arrays without axes: NumPy takes them faster than scalars, and it is asked in every control period.
+        self._inner, self._outer = np.array(length[-2]), np.array(length[-1])
+        self._pose_inner, self._phi_inner = np.array(self._pose[-2]), np.array(phi[-2])
+        self._base_rho = np.array((length[:-2] * np.sin(phi[:-2])).sum())
+        self._base_z = np.array((length[:-2] * np.cos(phi[:-2])).sum())
+        self._squares = np.square(self._inner), np.square(self._outer)
+        self._product = np.array(2.0 * length[-2] * length[-1])
+        self._half_turn, self._turn = np.array(np.pi), np.array(2.0 * np.pi)
+
+    def joints(self, position: ArrayLike, velocity: ArrayLike | None = None) -> tuple[Array, Array]:
+        """q_d [rad] and its exact derivative [rad/s], each (..., n), on the branch q_n > 0, with q_1 = atan2(y, x).
+
+        Args:
+            position: hand target [m], shape (..., 3).
+            velocity: its rate [m/s], same shape; zero when None.
+
+        Raises:
+            ValueError: the target is out of reach, with the distance missing.
+        """
+        position = np.asarray(position, dtype=np.float64)
+        velocity = np.zeros_like(position) if velocity is None else np.asarray(velocity, dtype=np.float64)
+        inner, outer = self._inner, self._outer
+        x, y, z = position[..., 0], position[..., 1], position[..., 2]
+        rho = np.hypot(x, y)
+        d_rho, d_z = rho - self._base_rho, z - self._base_z
+        distance = np.hypot(d_rho, d_z)
+        cosine = (distance**2 - self._squares[0] - self._squares[1]) / self._product
+        if not np.abs(cosine).max() <= 1.0:
+            missing = np.maximum(distance - (inner + outer), abs(inner - outer) - distance).max()
+            if not missing <= 0.0:
+                raise ValueError(
+                    f"position must be within reach of the last two links, got a point {missing:.4g} m outside it"
+                )
+            cosine = np.clip(cosine, -1.0, 1.0)
+        bend = np.arccos(cosine)
+        sin_bend = np.sin(bend)
+        phi_inner = np.arctan2(d_rho, d_z) - np.arctan2(outer * sin_bend, inner + outer * np.cos(bend))
+        phi_outer = phi_inner + bend
+
+        q = np.empty((*position.shape[:-1], self._pose.size))
+        q[...] = self._pose
+        q[..., 0] = np.arctan2(y, x)
+        # Turns are taken out so that the angle stays the one nearest to the pose's.
+        turned = np.mod(phi_inner - self._phi_inner + self._half_turn, self._turn)
+        q[..., -2] = self._pose_inner + turned - self._half_turn
+        q[..., -1] = bend
+
+        x_dot, y_dot, z_dot = velocity[..., 0], velocity[..., 1], velocity[..., 2]
+        rho_dot = (x * x_dot + y * y_dot) / rho
+        # rho_dot = l1 cos(phi1) w1 + l2 cos(phi2) w2 and z_dot = -l1 sin(phi1) w1 - l2 sin(phi2) w2, solved for w.
+        w_inner = (rho_dot * np.sin(phi_outer) + z_dot * np.cos(phi_outer)) / (inner * sin_bend)
+        w_outer = -(rho_dot * np.sin(phi_inner) + z_dot * np.cos(phi_inner)) / (outer * sin_bend)
+        q_dot = np.zeros(q.shape)
+        q_dot[..., 0] = (x * y_dot - y * x_dot) / rho**2
+        q_dot[..., -2] = w_inner
+        q_dot[..., -1] = w_outer - w_inner
+        return q, q_dot
+
+
 def inverse_kinematics(
     arm: ArmParameters, pose: ArrayLike, position: ArrayLike, velocity: ArrayLike | None = None
 ) -> tuple[Array, Array]:
@@ -90,38 +163,4 @@ def inverse_kinematics(
     Raises:
         ValueError: the target is out of reach, with the distance missing.
     """
-    pose, position = np.asarray(pose, dtype=np.float64), np.asarray(position, dtype=np.float64)
-    velocity = np.zeros_like(position) if velocity is None else np.asarray(velocity, dtype=np.float64)
-    length = arm.of_links("length")
-    inner, outer = length[-2], length[-1]
-    phi = pitches(pose)
-    base_rho, base_z = (length[:-2] * np.sin(phi[:-2])).sum(), (length[:-2] * np.cos(phi[:-2])).sum()
-
-    x, y, z = position[..., 0], position[..., 1], position[..., 2]
-    rho = np.hypot(x, y)
-    d_rho, d_z = rho - base_rho, z - base_z
-    distance = np.hypot(d_rho, d_z)
-    missing = np.maximum(distance - (inner + outer), abs(inner - outer) - distance).max()
-    if not missing <= 0.0:
-        raise ValueError(f"position must be within reach of the last two links, got a point {missing:.4g} m outside it")
-    cosine = (distance**2 - inner**2 - outer**2) / (2.0 * inner * outer)
-    bend = np.arccos(np.clip(cosine, -1.0, 1.0))
-    phi_inner = np.arctan2(d_rho, d_z) - np.arctan2(outer * np.sin(bend), inner + outer * np.cos(bend))
-    phi_outer = phi_inner + bend
-
-    q = np.broadcast_to(pose, (*position.shape[:-1], arm.n_joints)).copy()
-    q[..., 0] = np.arctan2(y, x)
-    # Turns are taken out so that the angle stays the one nearest to the pose's.
-    q[..., -2] = pose[-2] + np.mod(phi_inner - phi[-2] + np.pi, 2.0 * np.pi) - np.pi
-    q[..., -1] = bend
-
-    rho_dot = (x * velocity[..., 0] + y * velocity[..., 1]) / rho
-    z_dot = velocity[..., 2]
-    # rho_dot = l1 cos(phi1) w1 + l2 cos(phi2) w2 and z_dot = -l1 sin(phi1) w1 - l2 sin(phi2) w2, solved for w.
-    w_inner = (rho_dot * np.sin(phi_outer) + z_dot * np.cos(phi_outer)) / (inner * np.sin(bend))
-    w_outer = -(rho_dot * np.sin(phi_inner) + z_dot * np.cos(phi_inner)) / (outer * np.sin(bend))
-    q_dot = np.zeros_like(q)
-    q_dot[..., 0] = (x * velocity[..., 1] - y * velocity[..., 0]) / rho**2
-    q_dot[..., -2] = w_inner
-    q_dot[..., -1] = w_outer - w_inner
-    return q, q_dot
+    return HandPlacement(arm, pose).joints(position, velocity)

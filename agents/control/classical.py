@@ -19,7 +19,7 @@ from agents.control.posture import best_postures
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
 from elbow_gym.checks import positive
 from elbow_gym.env import ElbowArmEnv
-from elbow_gym.kinematics import inverse_kinematics
+from elbow_gym.kinematics import HandPlacement
 from elbow_gym.parameters import ArmParameters
 from elbow_gym.task.circle import Circle
 from elbow_gym.vector_env import ElbowArmVectorEnv
@@ -61,24 +61,30 @@ class Reference:
 
     def __init__(self, env: Env, pose: ArrayLike | None, reach_time: float) -> None:
         episodes = env.unwrapped.episodes
-        self._arm, self._circle = episodes.arm, episodes.targets if episodes.circle.random else episodes.circle
-        self._pose = episodes.pose if pose is None else np.asarray(pose, dtype=np.float64)
+        self._circle = episodes.targets if episodes.circle.random else episodes.circle
+        self._placement = HandPlacement(episodes.arm, episodes.pose if pose is None else pose)
         self._period, self._reach_time = episodes.settings.control_period, positive("reach_time", reach_time)
         self._start: Array | None = None
         self._calls = 0
 
-    def _desired(self, angle: Array) -> tuple[Array, Array]:
-        return inverse_kinematics(self._arm, self._pose, self._circle.position(angle), self._circle.velocity(angle))
+    def _desired(self, angle: Array) -> tuple[Array, Array, Array]:
+        """q_d [rad] and q_d_dot [rad/s] at the angle, and the change of q_d_dot over 2 ANGLE_STEP around it [rad/s]."""
+        angles = np.stack([angle, angle + ANGLE_STEP, angle - ANGLE_STEP])
+        if isinstance(self._circle, Circle):
+            position, velocity = self._circle.position(angles), self._circle.velocity(angles)
+        else:
+            position = np.stack([self._circle.position(one) for one in angles])
+            velocity = np.stack([self._circle.velocity(one) for one in angles])
+        q, q_dot = self._placement.joints(position, velocity)
+        return q[0], q_dot[0], q_dot[1] - q_dot[2]
 
     def next(self, angle: Array, q: Array) -> Motion:
         """The motion now, at the target's angle on the circle [rad], (...), with the arm at q [rad], (..., n)."""
         if self._start is None:
             self._start = q
         rate = np.asarray(self._circle.rate)[..., None]
-        q_d, q_d_dot = self._desired(angle)
-        q_d_ddot = (self._desired(angle + ANGLE_STEP)[1] - self._desired(angle - ANGLE_STEP)[1]) * (
-            rate / (2.0 * ANGLE_STEP)
-        )
+        q_d, q_d_dot, change = self._desired(angle)
+        q_d_ddot = change * (rate / (2.0 * ANGLE_STEP))
         blend, slope, curvature = minimum_jerk(self._calls * self._period / self._reach_time)
         slope, curvature = slope / self._reach_time, curvature / self._reach_time**2
         self._calls += 1
@@ -135,8 +141,7 @@ class GravityPD(SmoothPD):
     """
 
     def _voltage(self, wanted: Motion, q: Array, q_dot: Array, current: Array) -> Array:
-        rest = np.zeros_like(wanted.q)
-        holding = self._inverse.voltage(rest, self._inverse.drive(wanted.q, rest, rest).current)
+        holding = self._inverse.resistance * self._inverse.hold(wanted.q).current
         return super()._voltage(wanted, q, q_dot, current) + holding
 
 

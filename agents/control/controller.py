@@ -1,4 +1,4 @@
-"""What every controller is: something with Stable-Baselines3's `predict`, and how long that takes."""
+"""The protocol of a controller: an object with Stable-Baselines3's `predict`."""
 
 from __future__ import annotations
 
@@ -6,9 +6,6 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-EFFORT = {"pd_smooth": 2.0, "pd_gravity": 2.5, "computed_torque": 3.0, "computed_torque_posture": 8.0, "lqr": 8.0}
-"""Of a control period, times the PD's, for an honest time left; starting takes part of it."""
 
 
 class Controller(Protocol):

@@ -83,6 +83,10 @@ class InverseDynamics:
         links = pitch @ self.to_pitch.T + yaw @ self._base
         return links + q_ddot @ self._rotor + q_dot @ self._friction
 
+    def holding_torque(self, q: Array) -> Array:
+        """Torque of standing still without elbows [N m], (..., n): `torque` without rates and accelerations."""
+        return -(np.sin(q @ self.to_pitch) @ self._weight) @ self.to_pitch.T
+
     def elbow_heights(self, q: Any) -> Any:
         """C(q): height of each elbow [m], (..., p).   Eq. 18."""
         return np.cos(q @ self.to_pitch) @ self._below
@@ -122,7 +126,13 @@ class InverseDynamics:
             q_ddot: accelerations [rad/s^2], (..., n).
         """
         q = np.asarray(q, dtype=np.float64)
-        torque = self.torque(q, np.asarray(q_dot, dtype=np.float64), np.asarray(q_ddot, dtype=np.float64))
+        return self._drive(q, self.torque(q, np.asarray(q_dot, dtype=np.float64), np.asarray(q_ddot, dtype=np.float64)))
+
+    def hold(self, q: Array) -> Drive:
+        """Currents that hold a pose [rad], (..., n), at rest: those of `drive` without rates and accelerations."""
+        return self._drive(q, self.holding_torque(q))
+
+    def _drive(self, q: Array, torque: Array) -> Drive:
         if not self.elbows:
             return Drive(torque / self.torque_constant, np.zeros((*q.shape[:-1], 0)))
         unit = self._unit_torques(q)

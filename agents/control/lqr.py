@@ -83,9 +83,9 @@ def linearised_periods(settings: Settings, trajectory: Trajectory) -> tuple[Arra
         poses, rates = q + nudge[:, :n], q_dot + nudge[:, n : 2 * n]
         if elbows:
             poses = simulator.on_table(poses)
-            for k, pose in enumerate(poses):
-                jacobian = constraint_jacobian(arm, pose, elbows)
-                rates[k] -= np.linalg.pinv(jacobian) @ (jacobian @ rates[k])
+            jacobians = constraint_jacobian(arm, poses, elbows)
+            for k, (jacobian, inverse) in enumerate(zip(jacobians, np.linalg.pinv(jacobians), strict=True)):
+                rates[k] -= inverse @ (jacobian @ rates[k])
         simulator.reset(poses, rates, current + nudge[:, 2 * n : 3 * n])
         simulator.step(voltage + nudge[:, 3 * n :], settings.n_substeps)
         after = np.concatenate([simulator.q, simulator.q_dot, simulator.current], axis=-1)

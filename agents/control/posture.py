@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,10 @@ SPREAD = 1.0
 """Standard deviation of the poses that a search starts from [rad]."""
 BEND = 0.2
 """Least bend of the last joint [rad]: stretched, the hand could not follow both ways."""
+LARGEST = np.pi
+"""Bound of every angle [rad]."""
+NUDGE = 2.0**-26
+"""Step of the forward differences [rad], SciPy's own."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +40,11 @@ class Posture:
 
 def static_copper_loss(arm: ArmParameters, elbows: Sequence[int], q: Array) -> Array:
     """Sum of R i^2 at rest [W], (...), at poses [rad], (..., n), with the elbow forces of least loss."""
-    inverse = InverseDynamics(arm, elbows)
-    rest = np.zeros_like(q)
-    return (inverse.resistance * inverse.drive(q, rest, rest).current ** 2).sum(axis=-1)
+    return _loss_at_rest(InverseDynamics(arm, elbows), q)
+
+
+def _loss_at_rest(inverse: InverseDynamics, q: Array) -> Array:
+    return (inverse.resistance * inverse.hold(q).current ** 2).sum(axis=-1)
 
 
 def best_postures(
@@ -70,26 +78,36 @@ def best_postures(
     target = circle.position(2.0 * np.pi / CIRCLE_POINTS * np.arange(CIRCLE_POINTS))
     wanted = np.stack([np.hypot(target[:, 0], target[:, 1]), target[:, 2]], axis=-1)
     free = np.array([k for k in range(2, n + 1) if k + 1 not in elbows])
+    inverse = InverseDynamics(arm, elbows)
 
     def poses(angles: Array) -> Array:
-        """The idle joints' angles, then one pair of the last two joints per point, as poses (points, n)."""
-        idle = np.tile(np.concatenate([nominal[:1], angles[: n - 3]]), (CIRCLE_POINTS, 1))
-        return np.concatenate([idle, angles[n - 3 :].reshape(CIRCLE_POINTS, 2)], axis=1)
+        """The idle joints' angles, then one pair of the last two joints per point, as poses (..., points, n)."""
+        leading = angles.shape[:-1]
+        first = np.broadcast_to(nominal[:1], (*leading, CIRCLE_POINTS, 1))
+        idle = np.broadcast_to(angles[..., None, : n - 3], (*leading, CIRCLE_POINTS, n - 3))
+        return np.concatenate([first, idle, angles[..., n - 3 :].reshape(*leading, CIRCLE_POINTS, 2)], axis=-1)
 
     def ends(angles: Array) -> Array:
         phi = pitches(poses(angles))
         return np.stack([np.cumsum(length * np.sin(phi), axis=-1), np.cumsum(length * np.cos(phi), axis=-1)], axis=-1)
 
+    def loss(angles: Array) -> Array:
+        return _loss_at_rest(inverse, poses(angles)).mean(axis=-1)
+
     def held(angles: Array) -> Array:
         places = ends(angles)
-        return np.concatenate([(places[:, -1] - wanted).ravel(), places[0, [e - 2 for e in elbows], 1]])
+        off = (places[..., -1, :] - wanted).reshape(*angles.shape[:-1], 2 * CIRCLE_POINTS)
+        return np.concatenate([off, places[..., 0, [e - 2 for e in elbows], 1]], axis=-1)
 
-    conditions = [
-        {"type": "eq", "fun": held},
-        {"type": "ineq", "fun": lambda angles: angles[n - 2 :: 2] - BEND},
-    ]
+    def bent(angles: Array) -> Array:
+        return angles[..., n - 2 :: 2] - BEND
+
+    def above(angles: Array) -> Array:
+        return ends(angles)[..., free - 1, 1].reshape(*angles.shape[:-1], -1)
+
+    conditions = [_condition("eq", held), _condition("ineq", bent)]
     if above_table:
-        conditions.append({"type": "ineq", "fun": lambda angles: ends(angles)[:, free - 1, 1].ravel()})
+        conditions.append(_condition("ineq", above))
     rng = np.random.default_rng(seed)
     found: list[Posture] = []
     for k in range(starts):
@@ -98,11 +116,12 @@ def best_postures(
         # BLAS adds up in another order on more threads, and where a flat valley's search ends shows it.
         with threadpool_limits(1, user_api="blas"):
             best = minimize(
-                lambda angles: float(static_copper_loss(arm, elbows, poses(angles)).mean()),
+                lambda angles: float(loss(angles)),
                 guess,
                 method="SLSQP",
+                jac=partial(slopes, loss),
                 constraints=conditions,
-                bounds=[(-np.pi, np.pi)] * guess.size,
+                bounds=[(-LARGEST, LARGEST)] * guess.size,
                 options={"maxiter": 300, "ftol": 1e-6},
             )
         met = all((c["fun"](best.x) > -1e-6).all() for c in conditions) and (np.abs(held(best.x)) < 1e-6).all()
@@ -114,3 +133,19 @@ def best_postures(
             f"circle must allow a posture with the elbows {tuple(elbows)} down, got none in {starts} searches"
         )
     return sorted(found, key=lambda posture: posture.copper_loss)
+
+
+def _condition(kind: str, function: Callable[[Array], Array]) -> dict[str, Any]:
+    return {"type": kind, "fun": function, "jac": partial(slopes, function)}
+
+
+def slopes(function: Callable[[Array], Array], angles: Array) -> Array:
+    """Forward differences of a function of angles [1/rad], (k, m) or (m,), from one call with all of them as a batch.
+
+    Args:
+        function: maps angles [rad], (..., m), to values (..., k) or (...).
+        angles: where the slopes are taken [rad], (m,), within `LARGEST`, which the steps do not leave either.
+    """
+    nudged = angles + np.diag(np.where(angles + NUDGE > LARGEST, -NUDGE, NUDGE))
+    values = function(np.concatenate([angles[None], nudged]))
+    return (values[1:] - values[0]).T / (np.diagonal(nudged) - angles)

@@ -1,125 +1,255 @@
-"""Plays one controller in all regimes and says what it cost."""
+"""The one registry of players: who can play, in which environment, and what each is called and looks like."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, NamedTuple
 
 from agents.control.classical import COMPUTED, ComputedTorque, GravityPD, SmoothPD, economical_computed_torque
 from agents.control.controller import Controller
-from agents.evaluation.metrics import REGIMES, UNITS, Regime, joint_energies, metrics
-from agents.evaluation.recording import record
-from agents.shipped.seeds import load_policy
-from agents.tasks import task_settings
+from agents.control.lqr import TimeVaryingLQR
+from agents.control.trajectory import Trajectory
+from agents.shipped import OPTIMA
+from agents.shipped.seeds import load_policy, shipped_path, shipped_policies, shipped_seeds
+from agents.style import look
+from agents.tasks import POLICY_NAME, task_settings
 from elbow_gym.baselines.pd import CLIPPED, UNLIMITED, PDController
-from elbow_gym.baselines.policy import Policy, pair
-from elbow_gym.baselines.tasks import registered_arguments
+from elbow_gym.baselines.policy import Policy, baseline_path, pair, read_policy
+from elbow_gym.baselines.tasks import registered_arguments, task_name
 from elbow_gym.simulation.options import TABLE_TIMESTEP
-from elbow_gym.task.settings import Settings
+from elbow_gym.task.settings import STARTS, Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
-BENCHMARK_SEEDS = tuple(range(20_000, 20_020))
-"""Fixed and public; no training and no choice of a policy uses them."""
+Maker = Callable[[ElbowArmVectorEnv], Controller]
+"""Gives a controller for an environment."""
 
-SHIFTED: dict[str, Any] = {
-    "start_noise": 0.04,
-    "circle": {"radius": [0.05, 0.1], "period": [3.5, 7.0], "phase": "random"},
-    "randomize": {"payload": [0.05, 0.2]},
+ELBOW_COUNTS = (2, 1, 0)
+"""Elbow counts of the rigid table that players are compared at."""
+TABLE_ENV = "ElbowArmTable-v0"
+TABLE = "table"
+"""Name of the compliant table where others have their number of elbows."""
+
+
+class Classical(NamedTuple):
+    """A controller that needs neither training nor a trajectory."""
+
+    arguments: Mapping[str, Any]
+    """Arguments of the environment that it plays in."""
+    make: Maker
+    effort: float = 1.0
+    """Time of a control period, times the PD's."""
+
+
+CLASSICAL: dict[str, Classical] = {
+    "pd_paper": Classical(UNLIMITED, PDController),
+    "pd": Classical(CLIPPED, PDController),
+    "pd_smooth": Classical(CLIPPED, SmoothPD, 1.4),
+    "pd_gravity": Classical(CLIPPED, GravityPD, 1.9),
+    "computed_torque": Classical(COMPUTED, ComputedTorque, 2.8),
+    "computed_torque_posture": Classical(COMPUTED, economical_computed_torque, 6.0),
 }
-"""What the shifted set changes in an environment. No training and no tuning has used it; controllers are told the
-circle and not the payload. Larger circles are out of the paper PD's reach."""
-
-RECORDING_PERIOD = 0.001
-"""Fast controllers are recorded at this rate [s], slower ones at their own."""
-
-CLASSICAL: dict[str, tuple[dict[str, Any], Callable[[ElbowArmVectorEnv], Controller]]] = {
-    "pd_paper": (UNLIMITED, PDController),
-    "pd": (CLIPPED, PDController),
-    "pd_smooth": (CLIPPED, SmoothPD),
-    "pd_gravity": (CLIPPED, GravityPD),
-    "computed_torque": (COMPUTED, ComputedTorque),
-    "computed_torque_posture": (COMPUTED, economical_computed_torque),
-}
-"""Arguments of the environment and maker of each controller that needs neither training nor a trajectory."""
-
-Results = dict[str, dict[str, NDArray[np.float64]]]
+"""The classical controllers by name. "pd" is the paper's, clipped to 24 V and read at 2 kHz; "pd_paper" has no limit
+and is read at 10 kHz."""
+LQR_EFFORT = 20.0
+"""Time of the LQR's control period, times the PD's: its gains are found before the first."""
 
 
-def in_all_regimes(
-    settings: Settings,
-    make_controller: Callable[[ElbowArmVectorEnv], Controller],
-    seeds: Sequence[int] = BENCHMARK_SEEDS,
-    progress: Callable[[int, int], None] | None = None,
-    regimes: Sequence[Regime] = REGIMES,
-) -> Results:
-    """Metrics of every episode (S,) by regime and name; `joint_energy` beside them is (S, n).
+@dataclass(frozen=True)
+class Player:
+    """A controller with the environment it plays in."""
 
-    Regimes with the same start share one run.
+    name: str
+    """One name everywhere: on the command line, in tables and in files of results."""
+    task: str
+    """Short name of the environment, as `agents.tasks.task_name` gives it."""
+    settings: Settings
+    """Arguments of the environment."""
+    make: Maker
+    label: str
+    """Name in figures and tables for readers."""
+    colour: str
+    """#rrggbb."""
+    marker: str
+    """Matplotlib's letter."""
+    seed: int | None = None
+    """Seed of the training; None where nothing was trained."""
+    effort: float = 1.0
+    """Time of a control period, times the PD's, for an honest time left; starting takes part of it."""
+    identity: str = ""
+    """Digest of what the player is made of, beyond the code; empty where results must not be taken over."""
+    starts_together: bool = False
+    """Whether one controller serves arms that start in different poses at the same time."""
+
+    @property
+    def work(self) -> int:
+        """Cost of an episode, in control periods of the PD."""
+        return round(self.effort * self.settings.horizon)
+
+
+def player_of(name: str, settings: Settings, make: Maker, **more: Any) -> Player:
+    """A player from any maker of a controller; colour and marker are those of `agents.style`, if it has the name.
+
+    Args:
+        name: of the player.
+        settings: arguments of the environment.
+        make: gives the controller for an environment with these settings.
+        more: further fields of `Player`.
     """
-    results: Results = {}
-    recordings = {}
-    for regime in regimes:
-        if regime.start not in recordings:
-            started = replace(settings, start=regime.start)
-            every = max(1, round(settings.control_frequency * RECORDING_PERIOD))
-            recordings[regime.start] = record(started, make_controller, seeds, progress, every)
-        recording = recordings[regime.start]
-        results[regime.name] = metrics(recording, regime.since)
-        results[regime.name]["joint_energy"] = joint_energies(recording, regime.since)
-    return results
+    label, colour, marker = look(name)
+    bearing = TABLE if settings.table is not False else f"elbows{len(settings.elbow_joints)}"
+    fields = {"task": bearing, "label": label, "colour": colour, "marker": marker, **more}
+    return Player(name=name, settings=settings, make=make, **fields)
 
 
-def named_controller(
-    name: str, elbows: int | None, env: str = "ElbowArm-v0"
-) -> tuple[Settings, Callable[[ElbowArmVectorEnv], Controller]]:
-    """The environment and the maker of a controller by its name.
+class Entry(NamedTuple):
+    """A name in an environment with an elbow count: one player, or one for each training seed."""
 
-    Names: those of `CLASSICAL` ("pd" is the paper's clipped to 24 V and read at 2 kHz, "pd_paper" unlimited at 10 kHz),
-    an algorithm whose policy is shipped ("ppo", its best seed), or the path of a policy, which brings its own `env`.
+    name: str
+    elbows: int
+    env: str = "ElbowArm-v0"
+    """Id of the environment that is played in."""
+
+    @property
+    def bearing(self) -> str:
+        """What the arm leans on: its number of elbows, or `TABLE`."""
+        return TABLE if self.env == TABLE_ENV else str(self.elbows)
+
+    @property
+    def seeds(self) -> list[int | None]:
+        """Training seeds that are shipped; [None] where nothing was trained."""
+        group = learned().get(self)
+        return [None] if group is None else list(shipped_seeds(group))
+
+    def player(self, seed: int | None = None) -> Player:
+        """The player of a training seed, of the best one when None.
+
+        Raises:
+            ValueError: the name is not in the registry.
+        """
+        if self.name in CLASSICAL:
+            return classical_player(self.name, self.elbows, self.env)
+        if self.name == "lqr":
+            return lqr_player(self.elbows)
+        group = learned().get(self)
+        if group is None:
+            raise ValueError(f"player must be one of {sorted({entry.name for entry in entries()})}, got {self.name!r}")
+        path = baseline_path(group) if seed is None else shipped_path(group, seed)
+        settings = task_settings(self.env, self.elbows)
+        return policy_player(self.name, read_policy(path), settings, seed=int(path.name.rpartition("_seed")[2]))
+
+
+def entries() -> list[Entry]:
+    """Everyone who plays: classical controllers, and what a file is there for; the compliant table's at the end.
+
+    Where a policy for the compliant table is shipped, the classical controllers with a supply of 24 V play there too.
     """
-    if name in CLASSICAL:
-        arguments, make = CLASSICAL[name]
-        return settings_for(arguments, env, elbows), make
+    found = [Entry(name, elbows) for name in CLASSICAL for elbows in ELBOW_COUNTS]
+    found += [
+        Entry("lqr", elbows)
+        for elbows in ELBOW_COUNTS
+        if all(optimal_trajectory(elbows, start).is_file() for start in STARTS)
+    ]
+    policies = sorted(learned(), key=lambda entry: (entry.name, -entry.elbows))
+    found += [entry for entry in policies if entry.env != TABLE_ENV]
+    tabletop = [entry for entry in policies if entry.env == TABLE_ENV]
+    if tabletop:
+        found += [Entry(name, 0, TABLE_ENV) for name in CLASSICAL if name != "pd_paper"] + tabletop
+    return found
+
+
+def learned() -> dict[Entry, str]:
+    """Shipped policies, without the seed in their names, by the entry that they play.
+
+    Who was trained on drawn arms and circles plays the paper's, under a name that ends in "_random".
+    """
+    found: dict[Entry, str] = {}
+    for group in sorted({policy.rpartition("_seed")[0] for policy in shipped_policies()}):
+        parts = POLICY_NAME.fullmatch(group)
+        if parts is None:
+            continue
+        name, task = parts["controller"], parts["task"]
+        if task == "table":
+            found[Entry(name, 0, TABLE_ENV)] = group
+        elif task == "random":
+            found[Entry(f"{name}_random", 2)] = group
+        else:
+            found[Entry(name, int(task.removeprefix("elbows")))] = group
+    return found
+
+
+def find_player(name: str, elbows: int | None = None, env: str = "ElbowArm-v0") -> Player:
+    """A player by its name, as the command line takes it.
+
+    Args:
+        name: one of the registry ("pd", "lqr", "ppo"), or the path of a policy, which brings its own environment.
+        elbows: elbows on the table; the environment's own number when None.
+        env: id of the environment.
+
+    Raises:
+        ValueError: there is no such player, or a policy was trained with other elbows.
+    """
+    registered = registered_arguments(env)
+    entry = Entry(name, registered.get("elbows", 2) if elbows is None else elbows, env)
+    if name in CLASSICAL or (name == "lqr" and env == "ElbowArm-v0") or entry in learned():
+        return entry.player()
     is_path = pair(Path(name))[0].is_file()
+    if not is_path and not shipped_seeds(f"{name}_{task_name(env, elbows)}"):
+        beside = {one.name for one in entries() if one[1:] == entry[1:]}
+        known = sorted({*CLASSICAL, *beside})
+        raise ValueError(f"player must be one of {known} in {task_name(env, elbows)}, or a policy's path, got {name!r}")
     policy = load_policy(name) if is_path else load_policy(name, elbows=elbows, env=env)
     if elbows is not None and policy.settings.elbows != elbows:
         raise ValueError(f"elbows must be {policy.settings.elbows} as in the policy's training, got {elbows}")
-    return policy.settings, policy_maker(policy)
+    task = task_name(policy.card.env, policy.card.environment["elbows"])
+    return policy_player(name, policy, policy.settings, task=task)
+
+
+def classical_player(name: str, elbows: int | None, env: str) -> Player:
+    """One of `CLASSICAL` in a registered environment."""
+    arguments, make, effort = CLASSICAL[name]
+    settings = settings_for(arguments, env, elbows)
+    more = {"task": task_name(env, elbows), "effort": effort, "identity": name, "starts_together": True}
+    return player_of(name, settings, make, **more)
 
 
 def settings_for(arguments: Mapping[str, Any], env: str, elbows: int | None = None) -> Settings:
-    """A registered environment with a classical controller's own arguments; a table asks for shorter RK4 steps."""
+    """A registered environment with a controller's own arguments; a table asks for shorter RK4 steps."""
     table = registered_arguments(env).get("table", False) is not False
     shorter = {"timestep": min(TABLE_TIMESTEP, arguments["timestep"])} if table and "timestep" in arguments else {}
     return task_settings(env, elbows, {**arguments, **shorter})
 
 
-def policy_maker(policy: Policy) -> Callable[[ElbowArmVectorEnv], Controller]:
-    """Gives the policy for environments that it was made for, and ValueError for others."""
+def optimal_trajectory(elbows: int, start: str) -> Path:
+    """File of the optimal trajectory of the default reward from one of the environment's starts."""
+    return OPTIMA / f"elbows{elbows}{'_on_target' if start == 'on_target' else ''}.npz"
+
+
+def lqr_player(elbows: int) -> Player:
+    """The LQR around the optimal trajectory from the start that the environment has.
+
+    Raises:
+        ValueError: no optimal trajectory is there for the elbow count.
+    """
+    paths = {start: optimal_trajectory(elbows, start) for start in STARTS}
+    missing = [path.name for path in paths.values() if not path.is_file()]
+    if missing:
+        raise ValueError(f"elbows of the LQR must be a count with an optimal trajectory, got {elbows}: no {missing[0]}")
+
+    def follow(env: ElbowArmVectorEnv) -> TimeVaryingLQR:
+        return TimeVaryingLQR(env, Trajectory.load(paths[env.settings.start]))
+
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in paths.values())).hexdigest()
+    return player_of("lqr", task_settings("ElbowArm-v0", elbows), follow, effort=LQR_EFFORT, identity=digest)
+
+
+def policy_player(name: str, policy: Policy, settings: Settings, **more: Any) -> Player:
+    """A policy in environments that it was made for; its maker raises ValueError in others. See `player_of`."""
 
     def make(env: ElbowArmVectorEnv) -> Controller:
         policy.check(env)
         return policy
 
-    return make
-
-
-def print_results(title: str, results: Results) -> None:
-    """A table on the terminal: one row per metric, one column per regime, mean and standard deviation."""
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title=title)
-    table.add_column("metric")
-    table.add_column("unit")
-    for regime in REGIMES:
-        table.add_column(f"{regime.name}: {regime.meaning.split(':')[0]}", justify="right")
-    for name, unit in UNITS.items():
-        cells = [f"{results[r.name][name].mean():.4g} ± {results[r.name][name].std():.2g}" for r in REGIMES]
-        table.add_row(name.replace("_", " "), unit, *cells)
-    Console().print(table)
+    return player_of(name, settings, make, identity=policy.card.digest, **more)

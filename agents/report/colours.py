@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from agents.report.roster import TABLE
+from agents.evaluation.players import TABLE
 from agents.style import CONTROLLER_COLOURS, ELBOW_COLOURS, TARGET_COLOUR
 
 BACKGROUNDS = {"light": "#ffffff", "dark": "#14181d"}

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.evaluation.metrics import REGIMES
+from agents.evaluation.players import TABLE
 from agents.evaluation.recording import Recording
 from agents.paper.figures import CASES, SETTLED, VIEWS
-from agents.report.roster import TABLE
 from agents.report.runs import Run
 from agents.style import CONTROLLER_MARKERS, CONTROLLER_NAMES, ELBOW_NAMES
 from elbow_gym.kinematics import joint_positions

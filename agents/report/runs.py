@@ -1,19 +1,20 @@
-"""Plays what the report shows: one episode of every controller from each start, without noise."""
+"""Runs that the report shows: one episode of every controller from each start, without noise."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 from agents.evaluation.metrics import REGIMES, metrics
-from agents.evaluation.players import RECORDING_PERIOD
-from agents.evaluation.recording import Recording, record, thinned
+from agents.evaluation.players import TABLE, Entry
+from agents.evaluation.recording import Recording, thinned
+from agents.evaluation.regimes import RECORDING_PERIOD, recordings
 from agents.paper.cases import RECORD_PERIOD, measure
 from agents.paper.figures import SERIES_PERIOD
-from agents.report.roster import TABLE, Entry
-from agents.workers import Job, in_processes
+from agents.workers import Job, Tell, compile_before, counted, in_processes
 from elbow_gym.task.settings import STARTS
 
 PAPER_PD = ("pd_paper", "pd")
@@ -27,7 +28,7 @@ class Run:
     controller: str
     """As in the benchmark's tables."""
     bearing: str
-    """What the arm leans on: "2", "1" or "0" elbows, or `agents.report.roster.TABLE`."""
+    """What the arm leans on: "2", "1" or "0" elbows, or `agents.evaluation.players.TABLE`."""
     start: str
     """The environment's `start`."""
     series: Recording
@@ -43,35 +44,36 @@ class Run:
         return f"{self.controller}-{self.bearing}-{self.start}"
 
 
-def collect(entries: Sequence[Entry], progress: Callable[[int], Any]) -> list[Run]:
-    """Both runs of every entry, in the entries' order, from as many processes as there are cores."""
-    played = in_processes({entry: Job(partial(play, entry), entry.size) for entry in entries}, progress)
+def collect(entries: Sequence[Entry]) -> list[Run]:
+    """Both runs of every entry, in the entries' order, from as many processes as there are cores, with a bar."""
+    from tqdm import tqdm
+
+    players = {entry: entry.player() for entry in entries}
+    sizes = {entry: len(STARTS) * player.work for entry, player in players.items()}
+    alone = [(player.settings, 1) for player in players.values() if not player.starts_together]
+    # The LQR finds its gains with a batch.
+    batches = [player.settings for player in players.values() if player.name == "lqr"]
+    compile_before([*alone, *((player.settings, len(STARTS)) for player in players.values()), *batches])
+    layout = "{desc} {percentage:3.0f}%|{bar}| {elapsed} elapsed, {remaining} left"
+    # Work is told of in bursts: the time left follows the mean speed.
+    with tqdm(total=sum(sizes.values()), desc="playing", bar_format=layout, smoothing=0.0, file=sys.stderr) as bar:
+        played = in_processes({entry: Job(partial(play, entry), sizes[entry]) for entry in entries}, bar.update)
     return [run for entry in entries for run in played[entry]]
 
 
-def play(entry: Entry, progress: Callable[[int], Any]) -> list[Run]:
-    """An entry's runs from all starts; `progress` is told the entry's size in parts."""
-    settings, make = entry.contender()
+def play(entry: Entry, progress: Tell) -> list[Run]:
+    """An entry's runs from all starts; `progress` is told the units of work done since it was last told."""
+    best = entry.player()
+    exact = replace(best, settings=replace(best.settings, start_noise=0.0))
     paper = entry.name in PAPER_PD and entry.bearing != TABLE
-    period = RECORD_PERIOD if paper else RECORDING_PERIOD
-    every = max(1, round(settings.control_frequency * period))
-    runs, told = [], 0
-    for number, start in enumerate(STARTS):
-
-        def tell(done: int, horizon: int, number: int = number) -> None:
-            nonlocal told
-            reached = round(entry.size * (number + done / horizon) / len(STARTS))
-            progress(reached - told)
-            told = reached
-
-        started = replace(settings, start=start, start_noise=0.0)
-        recording = record(started, make, (0,), tell, every)
+    tell = counted(len(STARTS) * best.work, progress)
+    runs = []
+    for start, recording in recordings(exact, STARTS, (0,), tell, RECORD_PERIOD if paper else RECORDING_PERIOD).items():
         figures = {
             regime.name: {name: float(values[0]) for name, values in metrics(recording, regime.since).items()}
             for regime in REGIMES
             if regime.start == start
         }
         measured = measure(recording) if paper else None
-        series = thinned(recording, SERIES_PERIOD)
-        runs.append(Run(entry.controller, entry.bearing, start, series, figures, measured))
+        runs.append(Run(entry.name, entry.bearing, start, thinned(recording, SERIES_PERIOD), figures, measured))
     return runs

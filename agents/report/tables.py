@@ -8,18 +8,18 @@ from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
+from agents.evaluation.players import TABLE
 from agents.paper.cases import case_numbers, quantities
 from agents.paper.claims import Numbers, disclosures, verdict
 from agents.paper.figures import CASES
 from agents.report.payload import BEARINGS
-from agents.report.roster import TABLE
 from agents.report.runs import Run
 from agents.style import CONTROLLER_NAMES, ELBOW_NAMES
 
 PARTS = {"nominal": "energy", "shifted": "energy_shifted", TABLE: "energy_table"}
 """Parts of the benchmark and the files of their results."""
 LEARNED = ("ppo", "sac")
-PAPER_RUNS = {"paper": ("pd_paper", "paper"), "on target": ("pd_paper", "on_target"), "24 V": ("pd_24v", "paper")}
+PAPER_RUNS = {"paper": ("pd_paper", "paper"), "on target": ("pd_paper", "on_target"), "24 V": ("pd", "paper")}
 """Controller and start of `agents.paper.cases.RUNS`."""
 
 

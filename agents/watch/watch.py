@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from agents.evaluation.players import named_controller
-from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES
+from agents.evaluation.players import find_player
 from agents.watch.video import FRAME_RATES, Pixels, check_video, write_video
 from elbow_gym.checks import positive
 from elbow_gym.rendering.overlay import Instruments
@@ -28,19 +27,17 @@ LABEL_HEIGHT = 30.0
 """Of the label under a picture of 640 by 480 [pixels]."""
 
 
-def style_of(name: str) -> tuple[str, Colour]:
-    """What a controller is called in figures, and its colour there; black for one that has none."""
-    key = "pd_24v" if name == "pd" else name
-    colour = CONTROLLER_COLOURS.get(key, "#000000")
+def rgb(colour: str) -> Colour:
+    """Red, green and blue (0-255) of a colour #rrggbb."""
     red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
-    return CONTROLLER_NAMES.get(key, Path(name).name), (red, green, blue)
+    return red, green, blue
 
 
 class Performance:
     """One controller in an environment of its own, at its own control rate.
 
     Args:
-        name: of the controller, as `named_controller` takes it.
+        name: of the player, as `find_player` takes it.
         env: id of the environment.
         elbows: elbows on the table; the environment's own number when None.
         start: the environment's `start`.
@@ -48,13 +45,12 @@ class Performance:
     """
 
     def __init__(self, name: str, env: str, elbows: int | None, start: str, size: tuple[int, int]) -> None:
-        settings, make = named_controller(name, elbows, env)
-        self._env = ElbowArmVectorEnv(1, **replace(settings, start=start).arguments, autoreset_mode="Disabled")
-        self._controller = make(self._env)
-        title, colour = style_of(name)
-        self._viewer = Viewer(self._env.episodes, "rgb_array", *size, accent=colour)
-        self._label = label(title, colour, size)
-        self.duration = settings.duration
+        player = find_player(name, elbows, env)
+        self._env = ElbowArmVectorEnv(1, **replace(player.settings, start=start).arguments, autoreset_mode="Disabled")
+        self._controller = player.make(self._env)
+        self._viewer = Viewer(self._env.episodes, "rgb_array", *size, accent=rgb(player.colour))
+        self._label = label(player.label, rgb(player.colour), size)
+        self.duration = player.settings.duration
         """Of an episode [s]."""
 
     def restart(self, seed: int) -> None:

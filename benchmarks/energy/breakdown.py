@@ -1,4 +1,4 @@
-"""Where the paper PD's energy goes: the step at the start, the sag, the posture, and what is left, joint by joint."""
+"""The paper PD's energy in parts: the step at the start, the sag, the posture, and what is left, joint by joint."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from agents.control.classical import economical_pose
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.files import write_csv, write_text
 from agents.style import ELBOW_NAMES
+from benchmarks.energy import cache
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.task.settings import Settings
 
@@ -37,6 +38,15 @@ class Share(NamedTuple):
     """The exact motion in that posture."""
 
 
+class Motions(NamedTuple):
+    """Energy by joint [J], (n,), of exact motions on the target."""
+
+    papers: Array
+    """Idle joints in the paper's posture."""
+    least: Array
+    """Idle joints in the posture of least copper loss at rest."""
+
+
 def exact_energy(settings: Settings, pose: ArrayLike) -> Array:
     """Electrical energy by joint [J], (n,), of moving on the target without error, idle joints as in `pose` [rad].
 
@@ -52,14 +62,39 @@ def exact_energy(settings: Settings, pose: ArrayLike) -> Array:
     return np.trapezoid(voltage * current, time, axis=0)
 
 
-def breakdown(joint_energy: Callable[[int, str], Sequence[float]], elbow_counts: Sequence[int]) -> list[Share]:
-    """The shares for each elbow count, from the paper PD's energy by joint [J] at an elbow count in a regime."""
+def exact_motions(elbows: int) -> Motions:
+    """The exact motions of an elbow count in both postures."""
+    settings = Settings(elbows=elbows)
+    arm = settings.parsed_arm
+    best = economical_pose(arm, settings.elbow_joints, settings.parsed_circle)
+    return Motions(*(exact_energy(settings, pose) for pose in (arm.nominal_pose, best)))
+
+
+def stored_motions(folder: Path, elbows: int) -> Motions:
+    """`exact_motions`, kept in a folder: the search for the posture takes a second."""
+    key = cache.key({"motions": elbows, "code": Path(__file__).read_text(encoding="utf-8")})
+    stored = cache.load(key, folder)
+    if stored is None:
+        stored = {"exact": exact_motions(elbows)._asdict()}
+        cache.store(key, stored, folder)
+    return Motions(**stored["exact"])
+
+
+def breakdown(
+    joint_energy: Callable[[int, str], Sequence[float]],
+    elbow_counts: Sequence[int],
+    motions: Callable[[int], Motions] = exact_motions,
+) -> list[Share]:
+    """The shares for each elbow count.
+
+    Args:
+        joint_energy: the paper PD's energy by joint [J] at an elbow count in a regime.
+        elbow_counts: in the order of the shares.
+        motions: gives the exact motions at an elbow count.
+    """
     shares = []
     for elbows in elbow_counts:
-        settings = Settings(elbows=elbows)
-        arm = settings.parsed_arm
-        best = economical_pose(arm, settings.elbow_joints, settings.parsed_circle)
-        papers, least = (exact_energy(settings, pose) for pose in (arm.nominal_pose, best))
+        papers, least = motions(elbows)
         whole, on_target = (np.array(joint_energy(elbows, regime)) for regime in ("A", "C"))
         shares.append(Share(elbows, whole, whole - on_target, on_target - papers, papers - least, least))
     return shares

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from agents.files import write_whole
 
 ROOT = Path(__file__).parents[2]
-FOLDER = ROOT / ".benchmarks" / "energy"
 CODE = ("elbow_gym/**/*.py", "agents/control/*.py", "agents/evaluation/*.py", "agents/tasks.py")
 """Files whose text makes the results what they are."""
 PICTURES = "rendering"

@@ -1,50 +1,99 @@
-"""The energy benchmark's figures: all controllers by regime, and the energy of every joint."""
+"""The energy benchmark's figures: the controllers that matter side by side, and the energy of every joint."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from agents.evaluation.metrics import REGIMES
-from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES, ELBOW_NAMES, pyplot
-from benchmarks.energy.cells import ELBOW_COUNTS
+from agents.evaluation.players import ELBOW_COUNTS
+from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES, ELBOW_COLOURS, ELBOW_NAMES, pyplot
+from benchmarks.energy.cells import FEATURED
 
 if TYPE_CHECKING:
     from benchmarks.energy.rows import Row
 
-JOINTS_OF = ("pd_24v", "pd_gravity", "computed_torque_posture", "lqr", "ppo", "sac")
+JOINTS_OF = ("pd", "pd_gravity", "computed_torque_posture", "lqr", "ppo", "sac")
 """Whose joints are shown beside each other."""
 
 
+class Panel(NamedTuple):
+    """A panel of the comparison."""
+
+    regime: str
+    metric: str
+    title: str
+    label: str
+
+
+PANELS = (
+    Panel("A", "electrical_energy", "A: reach and track, 0-5 s", "electrical energy (J)"),
+    Panel("B", "electrical_energy", "B: track, 2-5 s", "electrical energy (J)"),
+    Panel("B", "error_rms", "B: track, 2-5 s", "hand error, rms (mm)"),
+)
+BEARING_MARKERS = {2: "o", 1: "s", 0: "^"}
+APART = 0.2
+"""Between the points of two elbow counts on a controller's line, whose spacing is 1."""
+
+
 def figure(rows: Sequence[Row], path: Path) -> None:
-    """Energy and tracking error of every controller, by regime and elbow count, on logarithmic axes."""
+    """Energy and error of `FEATURED` from the paper's pose as points with 95 % intervals, on logarithmic axes.
+
+    A line for each controller, the best return with most elbows at the top; colour and marker say the elbow count.
+    """
     plt = pyplot()
-    controllers = list(dict.fromkeys(row.controller for row in rows))
-    fig, axes = plt.subplots(2, len(REGIMES), figsize=(10, 6), sharex=True, sharey="row", layout="constrained")
-    panels = (("electrical_energy", "electrical energy (J)"), ("error_rms", "hand error, rms (mm)"))
-    width = 0.8 / len(controllers)
-    for column, regime in enumerate(REGIMES):
-        axes[0, column].set_title(f"{regime.name}: {regime.meaning}", fontsize=9)
-        for line, (metric, label) in enumerate(panels):
-            ax = axes[line, column]
-            for k, controller in enumerate(controllers):
-                chosen = [row for row in rows if row.controller == controller and row.regime == regime.name]
-                places = [ELBOW_COUNTS.index(row.elbows) + (k - (len(controllers) - 1) / 2) * width for row in chosen]
-                estimates = [row.figures[metric] for row in chosen]
-                values = [e.value for e in estimates]
-                spread = [[e.value - e.low for e in estimates], [e.high - e.value for e in estimates]]
-                colour, name = CONTROLLER_COLOURS[controller], CONTROLLER_NAMES[controller]
-                ax.bar(places, values, width, yerr=spread, color=colour, label=name, error_kw={"lw": 1})
-            ax.set_yscale("log")
-            ax.grid(axis="x", visible=False)
-            ax.set_xticks(range(len(ELBOW_COUNTS)), [ELBOW_NAMES[elbows] for elbows in ELBOW_COUNTS])
-            if column == 0:
-                ax.set_ylabel(label)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside upper center", ncols=min(5, len(controllers)))
+    from matplotlib.ticker import FixedLocator, NullFormatter, StrMethodFormatter
+
+    chosen = {(row.controller, row.elbows, row.regime): row for row in rows if row.controller in FEATURED}
+
+    def merit(controller: str) -> float:
+        most = max(elbows for name, elbows, _ in chosen if name == controller)
+        return chosen[controller, most, "A"].figures["return"].value
+
+    controllers = sorted({name for name, _, _ in chosen}, key=merit)
+    height = 1.5 + 0.4 * max(1, len(controllers))
+    fig, axes = plt.subplots(1, len(PANELS), figsize=(10, height), sharey=True, layout="constrained")
+    for ax, panel in zip(axes, PANELS, strict=True):
+        for elbows in ELBOW_COUNTS:
+            shift = APART * (elbows - 1)
+            shown = [(k + shift, chosen.get((name, elbows, panel.regime))) for k, name in enumerate(controllers)]
+            points = [(k, row.figures[panel.metric]) for k, row in shown if row is not None]
+            values = [estimate.value for _, estimate in points]
+            spread = [[e.value - e.low for _, e in points], [e.high - e.value for _, e in points]]
+            ax.errorbar(
+                values,
+                [k for k, _ in points],
+                xerr=spread,
+                fmt=BEARING_MARKERS[elbows],
+                color=ELBOW_COLOURS[elbows],
+                markersize=5.5,
+                capsize=3.5,
+                lw=1.5,
+                zorder=3,
+                label=ELBOW_NAMES[elbows],
+            )
+        ax.set_xscale("log")
+        low, high = ax.get_xlim()
+        ticks = [step * 10.0**power for power in range(-2, 5) for step in (1.0, 3.0)]
+        ax.xaxis.set_major_locator(FixedLocator([tick for tick in ticks if low <= tick <= high]))
+        ax.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        ax.xaxis.set_minor_formatter(NullFormatter())
+        ax.set_title(panel.title, fontsize=11)
+        ax.set_xlabel(panel.label, fontsize=11)
+        ax.tick_params(labelsize=10)
+    axes[0].set_yticks(range(len(controllers)), [CONTROLLER_NAMES[name] for name in controllers], fontsize=11)
+    axes[0].set_ylim(-0.5, len(controllers) - 0.5)
+    fig.legend(
+        *axes[0].get_legend_handles_labels(),
+        loc="outside upper center",
+        ncols=3,
+        fontsize=11,
+        title="elbows on the table; interquartile means with 95 % intervals",
+        title_fontsize=10,
+    )
     fig.savefig(path)
     plt.close(fig)
 

@@ -1,14 +1,16 @@
-"""The energy benchmark's rows as Markdown, CSV and a table on the terminal."""
+"""The energy benchmark's rows as Markdown and CSV."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from agents.evaluation.metrics import UNITS
 from agents.files import write_csv
-from agents.style import CONTROLLER_NAMES
+from agents.style import CONTROLLER_NAMES, ELBOW_NAMES
+from benchmarks.energy.cells import FEATURED
 from benchmarks.energy.statistics import Estimate
 
 if TYPE_CHECKING:
@@ -43,20 +45,41 @@ BRIEF_HEADER = (
 )
 
 
-def shown(row: Row, estimate: Callable[[Estimate], str]) -> tuple[str, ...]:
-    """A row's cells under HEADER; `estimate` writes the figures that have an interval."""
+def significant(value: float, digits: int = 3) -> str:
+    """A number to so many significant digits, without an exponent."""
+    rounded = float(f"{value:.{digits}g}")
+    if rounded == 0.0 or not math.isfinite(rounded):
+        return f"{rounded:g}"
+    return f"{rounded:.{max(0, digits - 1 - math.floor(math.log10(abs(rounded))))}f}"
+
+
+def percent(share: float) -> str:
+    """A share in percent, to three significant digits."""
+    return f"{significant(100.0 * share)} %"
+
+
+def by_player(rows: Sequence[Row]) -> dict[tuple[int, str], dict[str, Row]]:
+    """Rows of one part by regime, under elbow count and controller: most elbows first, then the best return in A."""
+    regimes: dict[tuple[int, str], dict[str, Row]] = {}
+    for row in rows:
+        regimes.setdefault((row.elbows, row.controller), {})[row.regime] = row
+    return dict(sorted(regimes.items(), key=lambda item: (-item[0][0], -item[1]["A"].figures["return"].value)))
+
+
+def shown(row: Row) -> tuple[str, ...]:
+    """A row's cells under HEADER."""
     figures = row.figures
     force = figures["smallest_elbow_force"].value
     return (
         CONTROLLER_NAMES.get(row.controller, row.controller),
         str(row.elbows),
         row.regime,
-        estimate(figures["electrical_energy"]),
-        f"{figures['drawn_energy'].value:.4g}",
-        estimate(figures["error_rms"]),
-        f"{figures['z_rms'].value:.3g}",
-        f"{figures['return'].value:.4g}",
-        "" if row.gap is None else f"{100.0 * row.gap:.3g} %",
+        with_interval(figures["electrical_energy"]),
+        significant(figures["drawn_energy"].value, 4),
+        with_interval(figures["error_rms"]),
+        significant(figures["z_rms"].value),
+        significant(figures["return"].value, 4),
+        "" if row.gap is None else percent(row.gap),
         # Only a negative force is a pull on the table.
         f"{force:.1f}" if force < 0.0 else "-",
         f"{figures['below_table'].value:.2f}",
@@ -66,58 +89,55 @@ def shown(row: Row, estimate: Callable[[Estimate], str]) -> tuple[str, ...]:
 
 def with_interval(estimate: Estimate) -> str:
     """A figure with its 95 % interval."""
-    return f"{estimate.value:.4g} [{estimate.low:.4g}, {estimate.high:.4g}]"
+    value, low, high = (significant(number, 4) for number in estimate)
+    return f"{value} [{low}, {high}]"
 
 
 def markdown(rows: Sequence[Row]) -> str:
     """Every row, with 95 % intervals."""
-    return _pipes([HEADER, *(shown(row, with_interval) for row in rows)])
+    return _pipes([HEADER, *(shown(row) for row in rows)])
 
 
 def brief(rows: Sequence[Row]) -> str:
-    """The README's table: a line per elbow count and controller, the regimes side by side, the best return first."""
-    regimes: dict[tuple[int, str], dict[str, Row]] = {}
-    for row in rows:
-        regimes.setdefault((row.elbows, row.controller), {})[row.regime] = row
-
-    def merit(key: tuple[int, str]) -> tuple[int, float]:
-        return -key[0], -regimes[key]["A"].figures["return"].value
-
+    """A line per elbow count and controller, the regimes side by side, the best return first."""
     lines: list[tuple[str, ...]] = [BRIEF_HEADER]
-    for key in sorted(regimes, key=merit):
-        whole, steady, on_target = (regimes[key][name] for name in "ABC")
+    for key, regimes in by_player(rows).items():
+        whole, steady, on_target = (regimes[name] for name in "ABC")
         lines.append(
             (
                 str(key[0]),
                 CONTROLLER_NAMES.get(key[1], key[1]),
                 with_interval(whole.figures["return"]),
-                "" if whole.gap is None else f"{100.0 * whole.gap:.3g} %",
+                "" if whole.gap is None else percent(whole.gap),
                 with_interval(whole.figures["electrical_energy"]),
-                f"{steady.figures['electrical_energy'].value:.4g}",
+                significant(steady.figures["electrical_energy"].value, 4),
                 with_interval(steady.figures["error_rms"]),
-                f"{on_target.figures['electrical_energy'].value:.4g}",
+                significant(on_target.figures["electrical_energy"].value, 4),
                 str(len(whole.seeds)) if whole.seeds else "-",
             )
         )
     return _pipes(lines)
 
 
+def short(rows: Sequence[Row]) -> str:
+    """A line for each of `FEATURED`, the best return with most elbows first: regime A at every elbow count."""
+    places = by_player([row for row in rows if row.controller in FEATURED])
+    counts = list(dict.fromkeys(elbows for elbows, _ in places))
+    header = ["controller", *(f"energy A, {ELBOW_NAMES[elbows]} (J)" for elbows in counts)]
+    header += [*(f"gap A, {ELBOW_NAMES[elbows]}" for elbows in counts), f"error B, {ELBOW_NAMES[counts[0]]} (mm)"]
+    lines = [tuple(header)]
+    for controller in (name for elbows, name in places if elbows == counts[0]):
+        of = [places[elbows, controller] for elbows in counts if (elbows, controller) in places]
+        energies = [significant(regimes["A"].figures["electrical_energy"].value) for regimes in of]
+        gaps = ["" if regimes["A"].gap is None else percent(regimes["A"].gap) for regimes in of]
+        error = significant(of[0]["B"].figures["error_rms"].value)
+        lines.append((CONTROLLER_NAMES[controller], *energies, *gaps, error))
+    return _pipes(lines)
+
+
 def _pipes(lines: Sequence[tuple[str, ...]]) -> str:
     rule = ("---",) * len(lines[0])
     return "".join(f"| {' | '.join(line)} |\n" for line in (lines[0], rule, *lines[1:]))
-
-
-def table(rows: Sequence[Row], title: str) -> Any:
-    """The same for the terminal, without the intervals."""
-    from rich.table import Table
-
-    body = Table(title=f"{title}: interquartile means over training seeds and episodes")
-    for name in HEADER:
-        body.add_column(name, justify="left" if name == "controller" else "right", no_wrap=name == "controller")
-    for row, after in zip(rows, [*rows[1:], None], strict=True):
-        last = after is None or (row.controller, row.elbows) != (after.controller, after.elbows)
-        body.add_row(*shown(row, lambda e: f"{e.value:.4g}"), end_section=last)
-    return body
 
 
 def write_rows(rows: Sequence[Row], path: Path) -> None:

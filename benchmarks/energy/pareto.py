@@ -42,7 +42,7 @@ def marks(rows: Sequence[Row]) -> list[Mark]:
 
 def gain_family(places: Sequence[Mark], elbows: int) -> list[Mark]:
     """The paper's PD at 24 V with all its gains, softest first; empty when only the paper's were played."""
-    family = sorted((m for m in places if m.controller == "pd_24v" and m.elbows == elbows), key=lambda m: m.gain)
+    family = sorted((m for m in places if m.controller == "pd" and m.elbows == elbows), key=lambda m: m.gain)
     return family if len(family) > 1 else []
 
 
@@ -80,7 +80,7 @@ def figure(places: Sequence[Mark], path: Path) -> None:
         family = gain_family(places, elbows)
         if family:
             line = [(mark.error, mark.energy) for mark in family]
-            colour = CONTROLLER_COLOURS["pd_24v"]
+            colour = CONTROLLER_COLOURS["pd"]
             ax.plot(*zip(*line, strict=True), ":", color=colour, marker=".", label="PD, 24 V, gains x 1/4 to 4")
         for mark in (mark for mark in places if mark.elbows == elbows and mark.gain == 1.0):
             ax.plot(

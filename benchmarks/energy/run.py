@@ -1,32 +1,64 @@
-"""`python -m benchmarks energy`: every controller in every regime; tables, CSV, JSON and figures."""
+"""`python -m benchmarks energy`: every controller in every regime; a report on the terminal, tables and figures."""
 
 from __future__ import annotations
 
 import json
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from agents.evaluation.metrics import REGIMES, UNITS
-from agents.evaluation.players import BENCHMARK_SEEDS, SHIFTED, in_all_regimes
+from agents.evaluation.players import Player
+from agents.evaluation.regimes import BENCHMARK_SEEDS, SHIFTED, in_all_regimes
 from agents.files import write_text, write_whole
-from agents.workers import Job, Tell, in_processes
+from agents.workers import Job, Tell, compile_before, counted, in_processes
 from benchmarks import learning
-from benchmarks.energy import breakdown, cache, pareto
+from benchmarks.energy import breakdown, cache, pareto, terminal
 from benchmarks.energy import figures as energy_figure
 from benchmarks.energy import markdown as energy_table
+from benchmarks.energy.blocks import publish_blocks
 from benchmarks.energy.cache import Results
-from benchmarks.energy.cells import PARTS, Cell, Contender, cells, contenders, starts, sweep, work
+from benchmarks.energy.cells import PARTS, Cell, cells, players, sweep, work
 from benchmarks.energy.rows import Row
-from benchmarks.energy.statistics import interquartile_mean
-from benchmarks.machine import PACKAGES, RESULTS, machine, versions
+from benchmarks.energy.statistics import center, interquartile_mean
+from benchmarks.machine import CACHE, LATEST, PACKAGES, RESULTS, machine, versions
 from benchmarks.optimal import Cell as Bound
 from benchmarks.optimal import cached as cached_bound
+
+FEW = 3
+"""Start poses of a run that is not full. With both starts side by side they fit into one block of the kernel."""
+LQR_ARMS = 80
+"""Arms that the LQR moves side by side to find its gains: all of a state's and the voltages' nudges, both ways."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The extent of a run, and where the results of its cells are kept."""
+
+    cells: Sequence[Cell]
+    seeds: Sequence[int]
+    """Seeds of the episodes."""
+    every_seed: bool = True
+    """Whether all training seeds of a learned controller play, or the best one."""
+    folder: Path = CACHE
+    fresh: bool = False
+    """Whether to measure what was measured before, too."""
+
+
+def plan(full: bool, episodes: int | None = None, **more: Any) -> Plan:
+    """The full benchmark or the short one, with so many start poses; `more` are further fields of `Plan`."""
+    count = episodes if episodes is not None else len(BENCHMARK_SEEDS) if full else FEW
+    if count < 1:
+        raise ValueError(f"episodes must be positive, got {count}")
+    seeds = [BENCHMARK_SEEDS[0] + k for k in range(count)]
+    return Plan(cells() + sweep() if full else cells(["nominal"]), seeds, full, **more)
 
 
 def bound(cell: Cell, regime: str) -> float | None:
@@ -36,62 +68,61 @@ def bound(cell: Cell, regime: str) -> float | None:
     return None if figures is None or cell.part != "nominal" else float(figures["closed_loop"])
 
 
-def play(cell: Cell, seeds: Sequence[int], folder: Path, fresh: bool, tell: Tell) -> list[Results]:
-    """The results of a cell's contenders, each from `folder` where the same was measured before.
-
-    Args:
-        cell: what is played.
-        seeds: of the episodes.
-        folder: where results are kept.
-        fresh: measure again all the same.
-        tell: called with the units of work done, `work` in all when all is measured.
-    """
-    measured = []
-    for player in contenders(cell):
-        question = {
-            "settings": player.settings.arguments,
-            "identity": player.identity,
-            "seeds": list(seeds),
-            "regimes": [regime.name for regime in cell.regimes],
-            "versions": versions("numpy", "numba", "scipy"),
-        }
-        name = cache.key(json.loads(json.dumps(question)))
-        results = None if fresh else cache.load(name, folder)
+def stored(cell: Cell, plan: Plan) -> list[Results] | None:
+    """The results of a cell's players from an earlier run; None when one is missing, or all are wanted fresh."""
+    if plan.fresh:
+        return None
+    found = []
+    for player in players(cell, plan.every_seed):
+        results = cache.load(_key(cell, player, plan), plan.folder)
         if results is None:
-            results = in_all_regimes(player.settings, player.make, seeds, _counted(player, tell), cell.regimes)
-            cache.store(name, results, folder)
+            return None
+        found.append(results)
+    return found
+
+
+def play(cell: Cell, plan: Plan, tell: Tell) -> list[Results]:
+    """The results of a cell's players, each from the plan's folder where the same was measured before.
+
+    `tell` is called with the units of work done, `work` in all when all is measured.
+    """
+    starts = len({regime.start for regime in cell.regimes})
+    measured = []
+    for player in players(cell, plan.every_seed):
+        name = _key(cell, player, plan)
+        results = None if plan.fresh else cache.load(name, plan.folder)
+        if results is None:
+            results = in_all_regimes(player, plan.seeds, counted(starts * player.work, tell), cell.regimes)
+            cache.store(name, results, plan.folder)
         else:
-            tell(len(starts(cell)) * player.work)
+            tell(starts * player.work)
         measured.append(results)
     return measured
 
 
-def _counted(player: Contender, tell: Tell) -> Callable[[int, int], None]:
-    """A callback for `record` that tells the work done since its last call."""
-    before = 0
-
-    def progress(done: int, total: int) -> None:
-        nonlocal before
-        # A second run, from the other start, counts from zero again.
-        before = before if before < done else 0
-        tell(player.work * done // total - player.work * before // total)
-        before = done
-
-    return progress
+def _key(cell: Cell, player: Player, plan: Plan) -> str:
+    question = {
+        "settings": player.settings.arguments,
+        "identity": player.identity,
+        "seeds": list(plan.seeds),
+        "regimes": [regime.name for regime in cell.regimes],
+        "versions": versions("numpy", "numba", "scipy"),
+    }
+    return cache.key(json.loads(json.dumps(question)))
 
 
-def rows_of(cell: Cell, measured: Sequence[Results]) -> list[Row]:
-    """A cell's rows from the results of its contenders."""
-    players = contenders(cell)
+def rows_of(cell: Cell, measured: Sequence[Results], every_seed: bool = True) -> list[Row]:
+    """A cell's rows from the results of its players."""
+    seeds = [player.seed for player in players(cell, every_seed)]
     rows = []
     for regime in cell.regimes:
         values = {name: np.stack([results[regime.name][name] for results in measured]) for name in UNITS}
         joints = np.concatenate([results[regime.name]["joint_energy"] for results in measured])
         figures = {name: interquartile_mean(samples) for name, samples in values.items()}
         own = [
-            {"seed": player.seed, **{name: interquartile_mean(values[name][k]).value for name in UNITS}}
-            for k, player in enumerate(players)
-            if player.seed is not None
+            {"seed": seed, **{name: center(values[name][k]) for name in UNITS}}
+            for k, seed in enumerate(seeds)
+            if seed is not None
         ]
         best = bound(cell, regime.name)
         rows.append(
@@ -100,7 +131,7 @@ def rows_of(cell: Cell, measured: Sequence[Results]) -> list[Row]:
                 cell.elbows,
                 regime.name,
                 figures,
-                tuple(interquartile_mean(column).value for column in joints.T),
+                tuple(center(column) for column in joints.T),
                 cell.part,
                 cell.gain,
                 tuple(own),
@@ -110,51 +141,76 @@ def rows_of(cell: Cell, measured: Sequence[Results]) -> list[Row]:
     return rows
 
 
-def measure(
-    seeds: Sequence[int],
-    tell: Tell,
-    folder: Path = cache.FOLDER,
-    fresh: bool = False,
-    parallel: bool = True,
-) -> list[Row]:
-    """Plays all cells, one on each core when `parallel`; `tell` gets the units of `work` done."""
-    everything = cells() + sweep()
-    if parallel:
-        jobs = {cell: Job(partial(play, cell, seeds, folder, fresh), work(cell)) for cell in everything}
-        measured = in_processes(jobs, tell)
-    else:
-        measured = {cell: play(cell, seeds, folder, fresh, tell) for cell in everything}
-    return [row for cell in everything for row in rows_of(cell, measured[cell])]
+def played_rows(cell: Cell, plan: Plan, tell: Tell) -> list[Row]:
+    """A cell's rows, played where they were not before: the work of one process."""
+    return rows_of(cell, play(cell, plan, tell), plan.every_seed)
 
 
-def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path) -> None:
+def measure(plan: Plan, parallel: bool = True) -> list[Row]:
+    """The rows of all cells; those that were not played before are played, with a bar, one on each core if `parallel`.
+
+    The kernel is compiled before.
+    """
+    from tqdm import tqdm
+
+    before = {cell: found for cell in plan.cells if (found := stored(cell, plan)) is not None}
+    todo = [cell for cell in plan.cells if cell not in before]
+    rows = {cell: rows_of(cell, found, plan.every_seed) for cell, found in before.items()}
+    if todo:
+        compile_before(batches(todo, plan))
+        total = sum(work(cell, plan.every_seed) for cell in todo)
+        with tqdm(total=total, file=sys.stderr, bar_format="{l_bar}{bar}| {elapsed} < {remaining}") as bar:
+            jobs = {cell: Job(partial(played_rows, cell, plan), work(cell, plan.every_seed)) for cell in todo}
+            done = in_processes(jobs, bar.update) if parallel else {c: jobs[c].work(bar.update) for c in todo}
+        rows.update(done)
+    return [row for cell in plan.cells for row in rows[cell]]
+
+
+def batches(todo: Sequence[Cell], plan: Plan) -> list[tuple[Any, int]]:
+    """Environments that cells will need, with their number of arms, for `compile_before`."""
+    found: list[tuple[Any, int]] = []
+    for cell in todo:
+        starts = len({regime.start for regime in cell.regimes})
+        for player in players(cell, every_seed=False):
+            found.append((player.settings, len(plan.seeds)))
+            if player.starts_together and starts > 1:
+                found.append((player.settings, starts * len(plan.seeds)))
+            if player.name == "lqr":
+                found.append((player.settings, LQR_ARMS))
+    return found
+
+
+def save(rows: Sequence[Row], plan: Plan, seconds: float, folder: Path) -> None:
     """Writes the tables, the figures and what made them, each file whole.
 
-    energy.csv and .md (nominal part), energy_brief.md of it, energy_shifted.*, energy_table.*, energy_seeds.csv,
-    energy.json; energy.png, energy_joints.png, pareto.png, pareto_gains.csv; breakdown.* of the paper's PD; learning.*
-    where curves are there.
+    energy.csv, .md, .png and .json of the nominal part; of a full run also energy_short.md and energy_brief.md for the
+    READMEs, energy_shifted.*, energy_table.*, energy_seeds.csv, energy_joints.png, pareto.png, pareto_gains.csv,
+    breakdown.* of the paper's PD, and learning.* where curves are there.
     """
     played = [row for row in rows if row.gain == 1.0]
+    nominal = [row for row in played if row.part == "nominal"]
     for part in PARTS:
         chosen = [row for row in played if row.part == part]
         stem = "energy" if part == "nominal" else f"energy_{part}"
         if chosen:
             energy_table.write_rows(chosen, folder / f"{stem}.csv")
             write_text(folder / f"{stem}.md", energy_table.markdown(chosen))
-    nominal = [row for row in played if row.part == "nominal"]
-    write_text(folder / "energy_brief.md", energy_table.brief(nominal))
-    energy_table.write_seeds(played, folder / "energy_seeds.csv")
     context = {
         "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
         "made": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "seconds": round(seconds, 1),
-        "seeds": list(seeds),
+        "seeds": list(plan.seeds),
         "shifted": SHIFTED,
         "machine": machine(),
         "versions": versions(*PACKAGES),
     }
     write_text(folder / "energy.json", json.dumps(context, indent=2) + "\n")
     write_whole(folder / "energy.png", lambda temporary: energy_figure.figure(nominal, temporary))
+    if not plan.every_seed:
+        return
+    write_text(folder / "energy_short.md", energy_table.short(nominal))
+    write_text(folder / "energy_brief.md", energy_table.brief(nominal))
+    energy_table.write_seeds(played, folder / "energy_seeds.csv")
     write_whole(folder / "energy_joints.png", lambda temporary: energy_figure.joints(nominal, temporary))
     marks = pareto.marks([row for row in rows if row.part == "nominal"])
     write_whole(folder / "pareto.png", lambda temporary: pareto.figure(marks, temporary))
@@ -162,41 +218,36 @@ def save(rows: Sequence[Row], seeds: Sequence[int], seconds: float, folder: Path
     papers = {(row.elbows, row.regime): row.joint_energy for row in nominal if row.controller == "pd_paper"}
     if papers:
         counts = list(dict.fromkeys(elbows for elbows, _ in papers))
-        breakdown.save(breakdown.breakdown(lambda elbows, regime: papers[elbows, regime], counts), folder)
+        exact = partial(breakdown.stored_motions, plan.folder)
+        breakdown.save(breakdown.breakdown(lambda elbows, regime: papers[elbows, regime], counts, exact), folder)
     learning.save(folder)
 
 
 def energy(
-    output: Path = RESULTS,
-    episodes: int = len(BENCHMARK_SEEDS),
+    output: Path = LATEST,
+    episodes: int | None = None,
     fresh: bool = False,
-    folder: Path = cache.FOLDER,
+    full: bool = False,
+    publish: bool = False,
+    folder: Path = CACHE,
     parallel: bool = True,
 ) -> list[Row]:
-    """Runs the comparison, prints the tables and writes the results. Returns the rows.
+    """Runs the comparison, writes the results and prints the report. Returns the rows.
 
     Args:
-        output: folder for the results.
-        episodes: start poses, one fixed seed each.
+        output: folder for the results, unless they are published.
+        episodes: start poses, one fixed seed each; all 20 of a full run and 3 of a short one when None.
         fresh: play what was played before, too.
+        full: all parts and training seeds; otherwise the nominal part and the best training seed.
+        publish: a full run whose results go to benchmarks/results, and their tables into the READMEs.
         folder: where results of single cells are kept.
         parallel: one cell on each core.
     """
-    from rich.console import Console
-    from tqdm import tqdm
-
-    seeds = [BENCHMARK_SEEDS[0] + k for k in range(episodes)]
     started = time.monotonic()
-    total = sum(work(cell) for cell in cells() + sweep())
-    with tqdm(total=total, file=sys.stderr, bar_format="{l_bar}{bar}| {elapsed} < {remaining}") as bar:
-        rows = measure(seeds, bar.update, folder, fresh, parallel)
-    save(rows, seeds, time.monotonic() - started, output)
-    # Wider than a pipe's 80 columns, which would cut the figures.
-    console = Console(width=max(Console().width, 120))
-    for part, meaning in PARTS.items():
-        chosen = [row for row in rows if row.part == part and row.gain == 1.0]
-        if chosen:
-            console.print(energy_table.table(chosen, f"{part.capitalize()} part, {meaning}"))
-    console.print("Regimes: " + "; ".join(f"{regime.name} = {regime.meaning}" for regime in REGIMES))
-    console.print(f"Written to {output}: energy*, pareto*, breakdown.*, learning.*")
+    chosen = plan(full or publish, episodes, folder=folder, fresh=fresh)
+    output = RESULTS if publish else output
+    rows = measure(chosen, parallel)
+    save(rows, chosen, time.monotonic() - started, output)
+    changed = publish_blocks(output) if publish else []
+    print(terminal.report(rows, len(chosen.seeds), chosen.every_seed, [output, *changed]))
     return rows

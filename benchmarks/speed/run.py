@@ -13,11 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from agents.files import write_csv, write_text, write_whole
+from agents.workers import compile_before
 from benchmarks.machine import PACKAGES, RESULTS, machine, versions
 from benchmarks.speed.environments import START, environment_contenders
 from benchmarks.speed.own import Contender, Sampler, own_contenders
 from benchmarks.speed.peers import MUJOCO, check_agreement, peer_contenders
 from benchmarks.speed.rows import RATIO, Row, ratios
+from elbow_gym.task.settings import Settings
 
 ROUNDS, SECONDS = 11, 0.1
 QUICK_ROUNDS, QUICK_SECONDS = 3, 0.002
@@ -183,6 +185,7 @@ def speed(output: Path = RESULTS, quick: bool = False) -> list[Row]:
     from tqdm import tqdm
 
     started, load = time.monotonic(), os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+    compile_before([(Settings(), 1), Settings()])
     differences = check_agreement()
     chosen = contenders(quick)
     rounds = QUICK_ROUNDS if quick else ROUNDS

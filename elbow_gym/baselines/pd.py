@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from elbow_gym.checks import positive
 from elbow_gym.env import ElbowArmEnv
-from elbow_gym.kinematics import inverse_kinematics
+from elbow_gym.kinematics import HandPlacement
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 PAPER_KP = 500.0
@@ -44,7 +44,7 @@ class PDController:
         episodes = cast("ElbowArmEnv | ElbowArmVectorEnv", env.unwrapped).episodes
         # A drawn circle is another one in each episode.
         self._layout, self._circle = episodes.layout, episodes.targets if episodes.circle.random else episodes.circle
-        self._arm, self._pose = episodes.arm, episodes.pose
+        self._pose, self._placement = episodes.pose, HandPlacement(episodes.arm, episodes.pose)
         self._volts, self._highest = episodes.volts_per_action, episodes.highest_action
         if not episodes.circle.random:
             self.desired(np.linspace(0.0, 2.0 * np.pi, 73))
@@ -54,8 +54,7 @@ class PDController:
 
         Where circles are drawn, one angle per arm, (B,).
         """
-        position, velocity = self._circle.position(angle), self._circle.velocity(angle)
-        return inverse_kinematics(self._arm, self._pose, position, velocity)
+        return self._placement.joints(self._circle.position(angle), self._circle.velocity(angle))
 
     def predict(
         self, observation: NDArray[np.float32], *_args: Any, **_kwargs: Any
@@ -65,5 +64,5 @@ class PDController:
         cosine, sine = seen["target_angle"][..., 0], seen["target_angle"][..., 1]
         q_d, q_d_dot = self.desired(np.arctan2(sine, cosine))
         voltage = self.kp * (q_d - self._pose - seen["joint_angle"]) + self.kd * (q_d_dot - seen["joint_velocity"])
-        action = np.clip(voltage / self._volts, -self._highest, self._highest)
+        action = np.minimum(np.maximum(voltage / self._volts, -self._highest), self._highest)
         return action.astype(np.float32), None

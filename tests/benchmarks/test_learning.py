@@ -42,7 +42,7 @@ def test_figure_and_table_come_from_the_files(tmp_path):
     results = tmp_path
     (results / "energy.csv").write_text(
         "controller,elbows,regime,electrical_energy [J],error_rms [mm],return [-]\n"
-        "pd_24v,2,A,800,400,-80\npd_24v,2,B,50,12,-4\n"
+        "pd,2,A,800,400,-80\npd,2,B,50,12,-4\n"
     )
     for seed, energy in ((0, 600.0), (1, 900.0)):
         row = dict.fromkeys(COLUMNS, 1.0) | {"electrical_energy": energy, "return": -30.0 - seed}

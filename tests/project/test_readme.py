@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.energy.blocks import BLOCKS, block
+from benchmarks.machine import RESULTS
+
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 SNIPPETS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
@@ -22,21 +25,15 @@ def test_readme_snippet_runs(snippet):
     exec(compile(snippet, "README.md", "exec"), {"__name__": "readme"})
 
 
-def test_energy_table_is_the_committed_one():
-    table = README.split("<!-- energy -->\n")[1].split("<!-- /energy -->")[0]
-    assert table == (ROOT / "benchmarks/results/energy_brief.md").read_text(encoding="utf-8")
+def test_tables_of_the_readmes_are_the_committed_ones():
+    for readme, blocks in BLOCKS.items():
+        page = (ROOT / readme).read_text(encoding="utf-8")
+        for name, file in blocks.items():
+            assert block(page, name) == (RESULTS / file).read_text(encoding="utf-8")
 
 
-def test_breakdown_in_the_benchmarks_readme_is_the_committed_one():
-    page = (ROOT / "benchmarks/README.md").read_text(encoding="utf-8")
-    table = page.split("<!-- breakdown -->\n")[1].split("<!-- /breakdown -->")[0]
-    assert table == (ROOT / "benchmarks/results/breakdown.md").read_text(encoding="utf-8")
-
-
-def test_learning_table_in_the_benchmarks_readme_is_the_committed_one():
-    page = (ROOT / "benchmarks/README.md").read_text(encoding="utf-8")
-    table = page.split("<!-- learning -->\n")[1].split("<!-- /learning -->")[0]
-    assert table == (ROOT / "benchmarks/results/learning.md").read_text(encoding="utf-8")
+def test_table_of_the_readme_has_at_most_eight_rows():
+    assert len(block(README, "energy").splitlines()) <= 2 + 8
 
 
 @pytest.mark.parametrize("path", re.findall(r"!\[[^]]*\]\(([^)]+)\)|`((?:tests|benchmarks|agents)/[\w./]+)`", README))

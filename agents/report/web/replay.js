@@ -14,9 +14,9 @@ const element = (id) => document.getElementById(id);
 
 const PRESETS = [
   ["Bracing: two elbows against none", ["pd_paper", 2], ["pd_paper", 0]],
-  ["Learning: the PD against PPO", ["pd_24v", 2], ["ppo", 2]],
+  ["Learning: the PD against PPO", ["pd", 2], ["ppo", 2]],
   ["The bound: PPO against the optimum", ["ppo", 2], ["lqr", 2]],
-  ["Held back by 24 V: no limit against 24 V", ["pd_paper", 2], ["pd_24v", 2]],
+  ["Held back by 24 V: no limit against 24 V", ["pd_paper", 2], ["pd", 2]],
 ];
 
 /** Quantities of the table under the slider: name, unit and value of a run at a time. */

@@ -61,7 +61,7 @@ def test_gravity_feed_forward_alone_holds_the_start_pose(arm, elbows):
 @pytest.mark.parametrize("elbows", [0, 1, 2])
 def test_computed_torque_tracks_without_the_paper_pds_sag(elbows):
     def error_rms(name):
-        arguments, make = CLASSICAL[name]
+        arguments, make, _ = CLASSICAL[name]
         settings = Settings(elbows=elbows, start="on_target", duration=1.6, **arguments)
         _, recording = rollout(settings, make)
         # The smooth reference has reached the target after a second.
@@ -75,7 +75,7 @@ def test_computed_torque_tracks_without_the_paper_pds_sag(elbows):
 def test_smooth_start_costs_less_than_the_step_and_is_there_sooner():
     figures = {}
     for name in ("pd", "pd_smooth"):
-        arguments, make = CLASSICAL[name]
+        arguments, make, _ = CLASSICAL[name]
         figures[name] = metrics(rollout(Settings(duration=1.5, **arguments), make)[1])
     assert figures["pd_smooth"]["electrical_energy"] < 0.7 * figures["pd"]["electrical_energy"]
     assert figures["pd_smooth"]["error_mean"] < figures["pd"]["error_mean"]
@@ -99,7 +99,7 @@ def test_economical_pose_keeps_the_elbows_down_and_costs_less_than_the_papers(ar
 
 @pytest.mark.parametrize("name", ["pd", "pd_smooth", "pd_gravity", "computed_torque"])
 def test_controllers_are_independent_of_the_batch(name):
-    arguments, make = CLASSICAL[name]
+    arguments, make, _ = CLASSICAL[name]
     env = ElbowArmVectorEnv(3, duration=0.1, **arguments)
     observation, _ = env.reset(seed=0)
     together, alone = make(env), make(env)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from agents.evaluation.metrics import REGIMES, UNITS, joint_energies, metrics
-from agents.evaluation.players import in_all_regimes
+from agents.evaluation.players import player_of
 from agents.evaluation.recording import record
+from agents.evaluation.regimes import in_all_regimes
 from elbow_gym.baselines.pd import PDController
 from elbow_gym.task.settings import Settings
 from tests.support.recordings import made_up
@@ -83,7 +84,7 @@ class Constant:
 
 def test_regimes_are_the_whole_run_its_end_and_a_run_from_the_target():
     settings = Settings(duration=2.2, start_noise=0.0)
-    found = in_all_regimes(settings, Constant, seeds=[3])
+    found = in_all_regimes(player_of("constant", settings, Constant), seeds=[3])
     from_pose, on_target = (record(replace(settings, start=start), Constant, [3]) for start in ("paper", "on_target"))
     assert np.linalg.norm(from_pose.hand[0] - from_pose.target[0]) > 1.5
     assert np.linalg.norm(on_target.hand[0] - on_target.target[0]) < 1e-6

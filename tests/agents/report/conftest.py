@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from agents.evaluation.metrics import metrics
+from agents.evaluation.players import Entry
 from agents.paper.cases import measure, settings_of
 from agents.report.command import RESULTS
 from agents.report.page import page
-from agents.report.roster import Entry
 from agents.report.runs import Run, play
 from tests.support.recordings import made_up, papers_target
 
@@ -47,11 +47,11 @@ def invented(controller, elbows, start):
 def runs():
     """The paper's cases, made up, and PPO's two runs as they are."""
     paper = [invented("pd_paper", elbows, start) for elbows in (2, 1, 0) for start in ("paper", "on_target")]
-    clipped = [invented("pd_24v", elbows, "paper") for elbows in (2, 1, 0)]
+    clipped = [invented("pd", elbows, "paper") for elbows in (2, 1, 0)]
     told = []
     entry = Entry("ppo", 2)
     learned = play(entry, told.append)
-    assert sum(told) == entry.size
+    assert sum(told) == 2 * entry.player().work
     return [*paper, *clipped, *learned]
 
 

@@ -176,3 +176,23 @@ def test_it_fits_the_screen_in_both_schemes(opened, width, scheme):
     brightness = np.mean([int(channel) for channel in re.findall(r"\d+", ground)[:3]])
     assert (brightness > 128) == (scheme == "light")
     keep_picture(opened, f"report_{width}_{scheme}.png")
+
+
+def test_the_benchmarks_table_fits_1280_pixels_with_every_row_and_its_lines_run_through(opened):
+    opened.execute_script(
+        "for (const filter of document.querySelectorAll('#filters select')) {"
+        "  if (filter.name !== 'set') filter.value = '';"
+        "  filter.dispatchEvent(new Event('change'));"
+        "}"
+    )
+    frame, table, rows = opened.execute_script(
+        "const frame = document.querySelector('#benchmark .scroll');"
+        "const rows = [...frame.querySelectorAll('tbody tr:not([hidden])')];"
+        "const edge = cell => [getComputedStyle(cell).borderTopWidth, cell.getBoundingClientRect().top];"
+        "return [frame.clientWidth, frame.scrollWidth, rows.map(row => [edge(row.cells[0]), edge(row.cells[1])])];"
+    )
+    assert table <= frame
+    assert len(rows) > 50
+    for first, second in rows:
+        assert first == second
+        assert first[0] == "1px"

@@ -10,12 +10,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from agents.evaluation.players import CLASSICAL
+from agents.evaluation import players
+from agents.evaluation.players import CLASSICAL, entries
 from agents.report import colours, command, payload
-from agents.report import roster as lineup
 from agents.report.command import RESULTS
 from agents.report.page import page
-from agents.report.roster import roster
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, ELBOW_COLOURS
 from benchmarks.energy import pareto
 from elbow_gym.kinematics import joint_positions
@@ -127,14 +126,13 @@ def test_colours_can_be_told_from_the_page(background):
 
 
 def test_every_controller_of_the_benchmark_is_played(tmp_path, monkeypatch):
-    assert {entry.elbows for entry in roster() if entry.name == "lqr"} == {2, 1, 0}
-    monkeypatch.setattr(lineup, "OPTIMA", tmp_path)
-    expected = {(name, elbows) for name in CLASSICAL for elbows in (2, 1, 0)}
-    assert {(entry.name, entry.elbows) for entry in roster()} >= expected
-    assert not [entry for entry in roster() if entry.name == "lqr"]
+    expected = {(name, elbows) for name in (*CLASSICAL, "lqr") for elbows in (2, 1, 0)}
+    assert {(entry.name, entry.elbows) for entry in entries()} >= expected
+    monkeypatch.setattr(players, "OPTIMA", tmp_path)
+    assert not [entry for entry in entries() if entry.name == "lqr"]
 
 
-def test_policies_are_played_where_they_were_trained(tmp_path, monkeypatch):
+def test_policies_are_played_where_they_were_trained(monkeypatch):
     shipped = [
         "ppo_elbows1_seed0",
         "ppo_elbows1_seed3",
@@ -142,18 +140,17 @@ def test_policies_are_played_where_they_were_trained(tmp_path, monkeypatch):
         "ppo_random_seed0",
         "sac_table_seed2",
     ]
-    monkeypatch.setattr(lineup, "shipped_policies", lambda: shipped)
-    monkeypatch.setattr(lineup, "OPTIMA", tmp_path)
-    learned = [entry for entry in roster() if entry.name not in CLASSICAL]
-    assert [(entry.controller, entry.bearing, entry.env) for entry in learned] == [
+    monkeypatch.setattr(players, "shipped_policies", lambda: shipped)
+    learned = [entry for entry in entries() if entry.name not in (*CLASSICAL, "lqr")]
+    assert [(entry.name, entry.bearing, entry.env) for entry in learned] == [
         ("ppo", "1", "ElbowArm-v0"),
-        ("ppo_random", "2", "ElbowArmRandom-v0"),
+        ("ppo_random", "2", "ElbowArm-v0"),
         ("sac_cloned", "0", "ElbowArm-v0"),
         ("sac", "table", "ElbowArmTable-v0"),
     ]
-    beside = [entry for entry in roster() if entry.bearing == "table" and entry.name in CLASSICAL]
+    beside = [entry for entry in entries() if entry.bearing == "table" and entry.name in CLASSICAL]
     assert {entry.name for entry in beside} == set(CLASSICAL) - {"pd_paper"}
-    assert all(entry.contender()[0].table for entry in beside)
+    assert all(entry.player().settings.table for entry in beside)
 
 
 def test_every_marker_has_its_drawing(document):
@@ -163,7 +160,7 @@ def test_every_marker_has_its_drawing(document):
 
 
 def test_the_command_writes_the_file_whole_or_not_at_all(runs, document, tmp_path, monkeypatch):
-    monkeypatch.setattr(command, "collect", lambda entries, progress: progress(1) or runs)
+    monkeypatch.setattr(command, "collect", lambda entries: runs)
     assert command.report(tmp_path / "all" / "report.html").read_text(encoding="utf-8") == document
 
     def broken(*_):

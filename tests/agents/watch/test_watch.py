@@ -8,11 +8,11 @@ from imageio_ffmpeg import count_frames_and_secs, read_frames
 from PIL import Image
 
 from agents.__main__ import app
-from agents.evaluation.players import named_controller
-from agents.style import CONTROLLER_COLOURS
+from agents.evaluation.players import find_player
+from agents.style import CONTROLLER_COLOURS, look
 from agents.watch import watch as watching
 from agents.watch.video import write_video
-from agents.watch.watch import Performance, frames, label, style_of, watch
+from agents.watch.watch import Performance, frames, label, rgb, watch
 from elbow_gym.rendering.screen import Window
 
 SIZE = (160, 120)
@@ -24,10 +24,10 @@ def short_episodes(monkeypatch):
     """Episodes of 0.3 s."""
 
     def short(*arguments):
-        settings, make = named_controller(*arguments)
-        return replace(settings, duration=0.3), make
+        player = find_player(*arguments)
+        return replace(player, settings=replace(player.settings, duration=0.3))
 
-    monkeypatch.setattr(watching, "named_controller", short)
+    monkeypatch.setattr(watching, "find_player", short)
 
 
 def performance(name="pd", elbows=2):
@@ -48,7 +48,7 @@ def test_gif_shows_both_controllers_side_by_side_to_the_end_of_the_episode(tmp_p
     assert durations == [60] * 5 + [2060]
     for k, name in enumerate(("pd", "ppo")):
         band = pictures[-1][-2, 160 * k : 160 * (k + 1)]
-        assert (np.abs(band - style_of(name)[1]).max(axis=-1) < 16).mean() > 0.5
+        assert (np.abs(band - rgb(look(name)[1])).max(axis=-1) < 16).mean() > 0.5
     for half in (slice(0, 160), slice(160, 320)):
         assert np.abs(pictures[-1][:120, half] - pictures[0][:120, half]).max() > 60
 
@@ -169,7 +169,8 @@ def test_interrupted_video_leaves_no_file(tmp_path):
 
 @pytest.mark.parametrize("name", CONTROLLER_COLOURS)
 def test_label_is_in_the_controllers_colour_with_readable_letters(name):
-    title, colour = style_of(name)
+    title, colour, _ = look(name)
+    colour = rgb(colour)
     strip = label(title, colour, (640, 480)).astype(int)
     np.testing.assert_array_equal(strip[0, 0], colour)
     channels = np.array([strip[0, 0], strip.reshape(-1, 3)[np.abs(strip - colour).sum(axis=-1).argmax()]]) / 255.0

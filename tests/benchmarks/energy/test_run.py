@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.evaluation.players import SHIFTED
+from agents.evaluation import players
 from agents.evaluation.recording import record
+from agents.evaluation.regimes import SHIFTED
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES
 from benchmarks.energy import cache, pareto
 from benchmarks.energy import cells as lineup
 from benchmarks.energy import run as energy
 from benchmarks.energy.cells import Cell
+from benchmarks.energy.run import Plan
 from benchmarks.energy.statistics import interquartile_mean
 from elbow_gym.baselines.pd import CLIPPED, PDController
 from elbow_gym.simulation.options import TABLE_TIMESTEP
@@ -61,7 +63,7 @@ def measured(tmp_path_factory):
         patch.setattr(energy, "cells", lambda: QUICK)
         patch.setattr(energy, "sweep", list)
         patch.setattr(energy.learning, "save", lambda folder: None)
-        rows = energy.energy(folder, episodes=2, folder=folder / "cache", parallel=False)
+        rows = energy.energy(folder, episodes=2, full=True, folder=folder / "cache", parallel=False)
     return folder, rows
 
 
@@ -73,6 +75,7 @@ def test_benchmark_writes_tables_figures_and_context(measured):
     expected = {f"{stem}.{suffix}" for stem in stems for suffix in ("csv", "md")}
     expected |= {
         "energy_brief.md",
+        "energy_short.md",
         "energy.json",
         "energy.png",
         "energy_joints.png",
@@ -86,16 +89,16 @@ def test_benchmark_writes_tables_figures_and_context(measured):
     assert float(written[0]["electrical_energy [J]"]) == pytest.approx(
         sum(float(written[0][f"electrical_energy_joint_{k} [J]"]) for k in range(1, 11)), rel=0.05
     )
-    assert int(written[0]["training_seeds [-]"]) == len(lineup.shipped_seeds("ppo_elbows2"))
+    assert int(written[0]["training_seeds [-]"]) == len(players.shipped_seeds("ppo_elbows2"))
     assert json.loads((folder / "energy.json").read_text())["seeds"] == [20_000, 20_001]
     with (folder / "energy_seeds.csv").open() as handle:
         assert {row["seed"] for row in csv.DictReader(handle)} == {
-            str(seed) for seed in lineup.shipped_seeds("ppo_elbows2")
+            str(seed) for seed in players.shipped_seeds("ppo_elbows2")
         }
 
 
 def rows_of(cell, folder, seeds=(20_000, 20_001), fresh=False, tell=lambda _: None):
-    return energy.rows_of(cell, energy.play(cell, seeds, folder, fresh, tell))
+    return energy.played_rows(cell, Plan([cell], seeds, folder=folder, fresh=fresh), tell)
 
 
 def test_interrupted_benchmark_goes_on(measured, monkeypatch):
@@ -121,9 +124,7 @@ def test_progress_tells_all_of_the_work_once(measured, tmp_path):
 def test_cells_sent_to_processes_are_those_played_here(measured, monkeypatch):
     folder, rows = measured
     monkeypatch.setattr(energy, "in_processes", in_this_process)
-    monkeypatch.setattr(energy, "cells", lambda: QUICK[:1])
-    monkeypatch.setattr(energy, "sweep", list)
-    assert energy.measure([20_000, 20_001], lambda _: None, folder / "other") == rows[:3]
+    assert energy.measure(Plan(QUICK[:1], [20_000, 20_001], folder=folder / "other")) == rows[:3]
 
 
 def test_gap_is_the_excess_over_the_bound_where_there_is_one(measured, monkeypatch):
@@ -144,26 +145,23 @@ def test_lineup_finds_what_is_shipped(monkeypatch):
         "sac_random_seed0",
         "ppo_table_seed2",
     ]
-    monkeypatch.setattr(lineup, "shipped_policies", lambda: names)
-    nominal = {
-        Cell("ppo", 2): "ppo_elbows2",
-        Cell("ppo_cloned", 0): "ppo_cloned_elbows0",
-        Cell("sac_random", 2): "sac_random",
-    }
-    shifted = {replace(cell, part="shifted"): name for cell, name in nominal.items()}
-    assert lineup.learned() == {**nominal, **shifted, Cell("ppo", 0, "table"): "ppo_table"}
+    monkeypatch.setattr(players, "shipped_policies", lambda: names)
+    nominal = {Cell("ppo", 2), Cell("ppo_cloned", 0), Cell("sac_random", 2)}
     everyone = lineup.cells()
-    assert {cell.controller for cell in everyone if cell.part == "table"} >= {"ppo", "pd_24v", "computed_torque"}
+    classical = {*players.CLASSICAL, "lqr"}
+    learned = {cell for cell in everyone if cell.controller not in classical}
+    assert learned == {*nominal, *(replace(cell, part="shifted") for cell in nominal), Cell("ppo", 0, "table")}
+    assert {cell.controller for cell in everyone if cell.part == "table"} >= {"ppo", "pd", "computed_torque"}
     assert len(everyone) == len(set(everyone))
     assert all(name in style for cell in everyone for name in [cell.controller] for style in STYLES)
 
 
 def test_table_part_is_played_on_the_table_and_a_gain_multiplies_both_of_the_papers():
-    [player] = lineup.contenders(Cell("pd_24v", 0, "table"))
+    [player] = lineup.players(Cell("pd", 0, "table"))
     assert player.settings.table is True
     assert player.settings.elbows == 0
     assert player.settings.timestep <= TABLE_TIMESTEP
-    [player] = lineup.contenders(Cell("pd_24v", 1, gain=4.0))
+    [player] = lineup.players(Cell("pd", 1, gain=4.0))
     controller = player.make(ElbowArmVectorEnv(1, **player.settings.arguments))
     assert (controller.kp, controller.kd) == (4.0 * 500.0, 4.0 * 20.0)
     assert player.settings.table is False
@@ -171,8 +169,8 @@ def test_table_part_is_played_on_the_table_and_a_gain_multiplies_both_of_the_pap
 
 def test_gain_family_runs_from_soft_to_stiff(tmp_path):
     figures = {"error_mean": interquartile_mean([1.0]), "electrical_energy": interquartile_mean([2.0])}
-    rows = [energy.Row("pd_24v", 2, "A", figures, (), gain=gain) for gain in (1.0, 4.0, 0.25)]
-    rows += [energy.Row("ppo", 2, "A", figures, ()), energy.Row("pd_24v", 2, "B", figures, ())]
+    rows = [energy.Row("pd", 2, "A", figures, (), gain=gain) for gain in (1.0, 4.0, 0.25)]
+    rows += [energy.Row("ppo", 2, "A", figures, ()), energy.Row("pd", 2, "B", figures, ())]
     places = pareto.marks(rows)
     assert [mark.gain for mark in pareto.gain_family(places, 2)] == [0.25, 1.0, 4.0]
     pareto.write_gains(places, tmp_path / "gains.csv")

@@ -1,0 +1,43 @@
+"""Slopes of the posture's search are those of the functions, and its steps stay within the bounds."""
+
+import numpy as np
+
+from agents.control.inverse_dynamics import InverseDynamics
+from agents.control.posture import LARGEST, slopes
+from elbow_gym.kinematics import pitches
+
+
+def test_slopes_are_the_derivatives_of_many_values_and_of_one():
+    angles = np.array([0.3, -1.2, 2.0])
+    np.testing.assert_allclose(slopes(np.sin, angles), np.diag(np.cos(angles)), atol=1e-7)
+    np.testing.assert_allclose(slopes(lambda q: np.prod(q, axis=-1), angles), [-2.4, 0.6, -0.36], atol=1e-7)
+
+
+def test_steps_stay_within_the_bounds_of_the_search():
+    asked = []
+
+    def function(angles):
+        asked.append(angles)
+        return angles.sum(axis=-1)
+
+    np.testing.assert_allclose(slopes(function, np.array([LARGEST, -LARGEST])), [1.0, 1.0], atol=1e-7)
+    assert np.abs(asked[0]).max() <= LARGEST
+
+
+def test_holding_torque_carries_the_weight_of_the_links_beyond_each_joint(arm):
+    rng = np.random.default_rng(0)
+    q = rng.normal(size=(4, 10))
+    length, mass, phi = arm.of_links("length"), arm.of_links("mass"), pitches(q)
+    tip = np.cumsum(length * np.sin(phi), axis=-1)
+    centre = tip - length * np.sin(phi) / 2.0
+    for joint in range(2, 11):
+        lever = centre[:, joint - 1 :] - tip[:, joint - 2][:, None]
+        expected = -arm.gravity * (mass[joint - 1 :] * lever).sum(axis=-1)
+        np.testing.assert_allclose(InverseDynamics(arm).holding_torque(q)[:, joint - 1], expected, atol=1e-12)
+
+
+def test_holding_a_pose_is_driving_without_motion(arm):
+    inverse = InverseDynamics(arm, (4, 7))
+    q, rest = np.random.default_rng(1).normal(size=(5, 10)), np.zeros((5, 10))
+    for held, driven in zip(inverse.hold(q), inverse.drive(q, rest, rest), strict=True):
+        np.testing.assert_allclose(held, driven, rtol=1e-12, atol=1e-12)
