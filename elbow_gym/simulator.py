@@ -121,7 +121,9 @@ class Simulator(Readings):
             mask: which arms, shape (B,); all when None.
             temperature_rise: of the windings above the ambient [K]; zero when None.
         """
-        q, q_dot, current, rise, chosen = self.check_state(q, q_dot, current, mask, temperature_rise)
+        *given, chosen = self.check_state(q, q_dot, current, mask, temperature_rise)
+        # They may be views of the running state, which is zeroed next.
+        q, q_dot, current, rise = (quantity.copy() for quantity in given)
         self._state[chosen] = 0.0
         if self.conditions.heat:
             self._state[chosen, STATE_ROWS + SWITCHED_STATE.index("temperature_rise")] = rise[chosen]

@@ -1,6 +1,10 @@
-"""What all tests share: a deterministic hypothesis profile, windows that nobody sees, and the paper's arm."""
+"""Configuration of all tests: hypothesis's profile, windows that nobody sees, one thread, markers, the paper's arm."""
 
 import os
+
+# Small networks and matrices lose more by handing work between threads than they gain; processes started here agree.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ["SDL_VIDEODRIVER"] = "dummy"
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -16,7 +20,14 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("elbow_gym")
-os.environ["SDL_VIDEODRIVER"] = "dummy"
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Marks what is soak or timing as slow, too, before `-m` chooses."""
+    for item in items:
+        if item.get_closest_marker("soak") or item.get_closest_marker("timing"):
+            item.add_marker("slow")
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,118 @@
+"""The classical controllers do what their names say, seen through the environment alone."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits
+
+from agents.control import classical
+from agents.control.classical import COMPUTED, GravityPD, Reference, economical_pose
+from agents.control.minimum_jerk import minimum_jerk
+from agents.control.posture import best_postures, static_copper_loss
+from agents.evaluation.metrics import metrics
+from agents.evaluation.players import CLASSICAL
+from agents.optimal.bound import rollout
+from elbow_gym import Simulator
+from elbow_gym.baselines.pd import CLIPPED
+from elbow_gym.kinematics import hand_position, inverse_kinematics, joint_positions
+from elbow_gym.task.circle import Circle
+from elbow_gym.task.settings import Settings
+from elbow_gym.vector_env import ElbowArmVectorEnv
+
+
+def test_minimum_jerk_starts_and_ends_at_rest_without_acceleration():
+    blend, slope, curvature = minimum_jerk([-1.0, 0.0, 1.0, 2.0])
+    np.testing.assert_array_equal(blend, [0.0, 0.0, 1.0, 1.0])
+    np.testing.assert_array_equal(slope, 0.0)
+    np.testing.assert_array_equal(curvature, 0.0)
+
+
+def test_minimum_jerk_derivatives_are_the_blends():
+    s, step = np.linspace(0.05, 0.95, 19), 1e-5
+    (_, slope, curvature), ahead, behind = minimum_jerk(s), minimum_jerk(s + step), minimum_jerk(s - step)
+    np.testing.assert_allclose(slope, (ahead[0] - behind[0]) / (2 * step), atol=1e-8)
+    np.testing.assert_allclose(curvature, (ahead[1] - behind[1]) / (2 * step), atol=1e-7)
+
+
+def test_reference_leaves_the_arms_pose_and_ends_with_the_hand_on_the_target():
+    env = ElbowArmVectorEnv(1, **COMPUTED)
+    reference, start = Reference(env, None, 0.1), np.array([env.episodes.pose]) + 0.01
+    motions = [reference.next(np.array([0.3]), start) for _ in range(60)]
+    np.testing.assert_allclose(motions[0].q, start, atol=1e-12)
+    np.testing.assert_allclose(motions[0].q_dot, 0.0, atol=1e-12)
+    expected = env.episodes.circle.position(np.array([0.3]))
+    np.testing.assert_allclose(hand_position(env.episodes.arm, motions[-1].q), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("elbows", [0, 1, 2])
+def test_gravity_feed_forward_alone_holds_the_start_pose(arm, elbows):
+    env = ElbowArmVectorEnv(1, elbows=elbows, start_noise=0.0, **CLIPPED)
+    observation, _ = env.reset(seed=0)
+    # At the first call the reference is the pose itself: what remains is the feed-forward.
+    voltage, _ = GravityPD(env).predict(observation)
+    simulator = Simulator(arm, elbows)
+    current = voltage / arm.of_motors("armature_resistance")
+    simulator.reset(env.episodes.pose, current=current)
+    simulator.step(voltage.astype(float), 50)
+    np.testing.assert_allclose(simulator.q[0], env.episodes.pose, atol=1e-4)
+
+
+@pytest.mark.parametrize("elbows", [0, 1, 2])
+def test_computed_torque_tracks_without_the_paper_pds_sag(elbows):
+    def error_rms(name):
+        arguments, make, _ = CLASSICAL[name]
+        settings = Settings(elbows=elbows, start="on_target", duration=1.6, **arguments)
+        _, recording = rollout(settings, make)
+        # The smooth reference has reached the target after a second.
+        late = recording.time > 1.2
+        error = np.linalg.norm(recording.hand - recording.target, axis=-1)[late]
+        return np.sqrt((error**2).mean())
+
+    assert error_rms("computed_torque") < 0.2 * error_rms("pd")
+
+
+def test_smooth_start_costs_less_than_the_step_and_is_there_sooner():
+    figures = {}
+    for name in ("pd", "pd_smooth"):
+        arguments, make, _ = CLASSICAL[name]
+        figures[name] = metrics(rollout(Settings(duration=1.5, **arguments), make)[1])
+    assert figures["pd_smooth"]["electrical_energy"] < 0.7 * figures["pd"]["electrical_energy"]
+    assert figures["pd_smooth"]["error_mean"] < figures["pd"]["error_mean"]
+
+
+def test_economical_pose_keeps_the_elbows_down_and_costs_less_than_the_papers(arm, monkeypatch):
+    elbows, circle = (4,), Circle()
+    # The first of its searches, from the paper's pose, is enough.
+    monkeypatch.setattr(classical, "best_postures", partial(best_postures, starts=1))
+    pose = economical_pose(arm, elbows, circle)
+    heights = joint_positions(arm, pose)[2:, 2]
+    assert abs(heights[1]) < 1e-5
+    assert heights.min() > -1e-5
+    angle = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+    mine, papers = (
+        static_copper_loss(arm, elbows, inverse_kinematics(arm, q, circle.position(angle))[0]).mean()
+        for q in (pose, arm.nominal_pose)
+    )
+    assert mine < 0.75 * papers
+
+
+@pytest.mark.parametrize("name", ["pd", "pd_smooth", "pd_gravity", "computed_torque"])
+def test_controllers_are_independent_of_the_batch(name):
+    arguments, make, _ = CLASSICAL[name]
+    env = ElbowArmVectorEnv(3, duration=0.1, **arguments)
+    observation, _ = env.reset(seed=0)
+    together, alone = make(env), make(env)
+    for _ in range(3):
+        action, _ = together.predict(observation)
+        np.testing.assert_allclose(action[1:2], alone.predict(observation[1:2])[0], rtol=1e-6, atol=1e-4)
+        observation, *_ = env.step(action)
+
+
+@pytest.mark.parametrize("elbows", [(), (4,), (4, 7)])
+def test_the_posture_found_depends_on_no_number_of_threads(arm, elbows):
+    found = []
+    for threads in (1, 2):
+        with threadpool_limits(threads, user_api="blas"):
+            found.append(best_postures(arm, elbows, Circle(), starts=1)[0].pose)
+    np.testing.assert_array_equal(*found)

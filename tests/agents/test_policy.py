@@ -1,0 +1,171 @@
+"""Policies: files that never unpickle, an actor equal to SB3's, and refusals that say why."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO
+
+import agents.pd
+import elbow_gym
+from agents.learning.actor import policy_of, save_policy
+from agents.learning.sac.settings import SACSettings
+from agents.shipped import seeds as shipped
+from agents.shipped.seeds import load_policy
+from elbow_gym.baselines import policy as baselines
+from elbow_gym.baselines.policy import Policy
+from elbow_gym.env import ElbowArmEnv
+from elbow_gym.sb3 import SB3VecEnv
+from elbow_gym.task.settings import Settings
+from elbow_gym.vector_env import ElbowArmVectorEnv
+
+
+@pytest.fixture(scope="module")
+def model():
+    arms = SB3VecEnv(ElbowArmVectorEnv(2, autoreset_mode="SameStep"))
+    kwargs = {"net_arch": [8, 8], "activation_fn": torch.nn.Tanh, "log_std_init": -1.5}
+    return PPO("MlpPolicy", arms, n_steps=4, batch_size=8, policy_kwargs=kwargs, seed=0, device="cpu")
+
+
+@pytest.fixture
+def policy(model):
+    return policy_of(model, Settings(), command="test")
+
+
+def test_policy_acts_as_the_model_that_it_came_from(model, policy):
+    observation = np.random.default_rng(0).normal(size=(7, policy.card.layers[0])).astype(np.float32)
+    expected, _ = model.predict(observation, deterministic=True)
+    np.testing.assert_allclose(policy.predict(observation)[0], expected, atol=1e-6)
+    np.testing.assert_allclose(policy.predict(observation[0])[0], expected[0], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("activation", "output"), [("tanh", "clip"), ("relu", "tanh"), ("elu", "clip"), ("silu", "clip")]
+)
+def test_torch_form_acts_as_the_numpy_one(policy, activation, output):
+    other = Policy(replace(policy.card, activation=activation, output=output), policy.weights)
+    observation = np.random.default_rng(1).normal(size=(9, policy.card.layers[0]), scale=30.0).astype(np.float32)
+    with torch.no_grad():
+        expected = other.module()(torch.from_numpy(observation)).numpy()
+    np.testing.assert_allclose(other.predict(observation)[0], expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("use_sde", [False, True])
+def test_squashed_actor_acts_as_the_model_that_it_came_from(use_sde, tmp_path):
+    env = {"elbows": 0, "table": True}
+    settings = Settings(**env)
+    arms = SB3VecEnv(ElbowArmVectorEnv(2, **env, autoreset_mode="SameStep"))
+    model = SACSettings(hidden=(8, 8), buffer_size=10, use_sde=use_sde).model(arms, 0, tmp_path)
+    with torch.no_grad():
+        model.actor.mu.weight.mul_(3000.0)
+    # Half of the way, so that what is played differs from the actor.
+    model.policy.follow(0.0, 0.5)
+    squashed = policy_of(model, settings, command="test")
+    squashed.check(ElbowArmEnv(**env))
+    observation = np.random.default_rng(0).normal(size=(7, squashed.card.layers[0])).astype(np.float32)
+    expected, _ = model.predict(observation, deterministic=True)
+    assert np.abs(expected).max() > 0.9
+    np.testing.assert_allclose(squashed.predict(observation)[0], expected, atol=1e-6)
+    with pytest.raises(ValueError, match="observation of the policy must be"):
+        squashed.check(ElbowArmEnv())
+
+
+def test_weights_of_another_card_are_refused(policy):
+    other = {name: weights + 1.0 for name, weights in policy.weights.items()}
+    with pytest.raises(ValueError, match="weights must be those of the card, with the digest"):
+        Policy(policy.card, other)
+
+
+def test_saved_policy_comes_back_bit_for_bit(policy, tmp_path):
+    save_policy(policy, tmp_path / "p")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["p.json", "p.safetensors"]
+    back = load_policy(tmp_path / "p")
+    assert back.card == policy.card
+    for name, weights in policy.weights.items():
+        np.testing.assert_array_equal(back.weights[name], weights)
+
+
+def test_interrupted_save_leaves_the_old_policy(policy, tmp_path, monkeypatch):
+    save_policy(policy, tmp_path / "p")
+    before = (tmp_path / "p.safetensors").read_bytes()
+    monkeypatch.setattr("safetensors.numpy.save_file", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
+    with pytest.raises(OSError, match="disk full"):
+        save_policy(policy, tmp_path / "p")
+    assert (tmp_path / "p.safetensors").read_bytes() == before
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("env", "message"),
+    [
+        ({"elbows": 1}, r"elbow_joints of the environment must be \(4, 7\) as in training, got \(4,\)"),
+        ({"voltage_limit": 12.0}, r"voltage_limit of the environment must be 24.0 as in training, got 12.0"),
+        ({"control_frequency": 100.0}, r"control_frequency of the environment must be 50.0 .* got 100.0"),
+        ({"action_unit": "volt"}, r"action_unit of the environment must be 'fraction' .* got 'volt'"),
+    ],
+)
+def test_policy_refuses_another_environment(policy, env, message):
+    policy.check(ElbowArmEnv())
+    with pytest.raises(ValueError, match=message):
+        policy.check(ElbowArmEnv(**env))
+
+
+def test_policy_refuses_another_observation(policy):
+    for card, message in (
+        (replace(policy.card, observation_version=0), "observation_version of the policy must be"),
+        (replace(policy.card, observation=policy.card.observation[::-1]), "observation of the policy must be"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            Policy(card, policy.weights).check(ElbowArmEnv())
+    with pytest.raises(ValueError, match=r"observation must have \d+ entries, got 3"):
+        policy.predict(np.zeros(3, np.float32))
+
+
+def test_bundle_that_does_not_fit_is_refused(policy, tmp_path):
+    with pytest.raises(ValueError, match=r"weight_0 must have shape \(8, \d+\), got nothing"):
+        Policy(policy.card, {})
+    with pytest.raises(ValueError, match="activation must be one of"):
+        Policy(replace(policy.card, activation="sine"), policy.weights)
+    with pytest.raises(ValueError, match="format of the policy must be 1, got 7"):
+        Policy(replace(policy.card, format=7), policy.weights)
+    with pytest.raises(ValueError, match=r"policy must be one of .*got no"):
+        load_policy(tmp_path / "nothing")
+    save_policy(policy, tmp_path / "p")
+    (tmp_path / "p.json").write_text(json.dumps({"algorithm": "ppo"}))
+    with pytest.raises(ValueError, match="policy card must hold the fields of PolicyCard"):
+        load_policy(tmp_path / "p")
+
+
+def test_package_and_agents_load_the_same_baseline():
+    for arguments in ({"elbows": 2}, {"env": "ElbowArmTable-v0"}):
+        assert elbow_gym.load_policy("ppo", **arguments).card == load_policy("ppo", **arguments).card
+    assert elbow_gym.load_policy("ppo", elbows=2).card.training["seed"] == 2
+    assert agents.load_policy is load_policy
+    assert agents.pd.PDController is elbow_gym.PDController
+
+
+def test_baseline_is_loaded_unless_a_seed_is_given(policy, tmp_path, monkeypatch):
+    best, others = tmp_path / "best", tmp_path / "others"
+    for module, name, folder in (
+        (baselines, "BASELINES", best),
+        (shipped, "BASELINES", best),
+        (shipped, "POLICIES", others),
+    ):
+        monkeypatch.setattr(module, name, folder)
+    for seed, merit, folder in ((0, -40.0, others), (3, -30.0, best), (10, -35.0, others)):
+        save_policy(
+            Policy(replace(policy.card, evaluation={"return": merit}), policy.weights), folder / f"ppo_table_seed{seed}"
+        )
+    assert shipped.shipped_seeds("ppo_table") == [0, 3, 10]
+    assert load_policy("ppo", env="ElbowArmTable-v0").card.evaluation["return"] == -30.0
+    for seed, merit in ((3, -30.0), (10, -35.0)):
+        assert load_policy("ppo", env="ElbowArmTable-v0", seed=seed).card.evaluation["return"] == merit
+    with pytest.raises(ValueError, match=r"seed of ppo_table must be one of \[0, 3, 10\], got 1"):
+        load_policy("ppo", env="ElbowArmTable-v0", seed=1)
+    for seed in (None, 0):
+        with pytest.raises(ValueError, match=r"policy must be one of \['ppo_table'\], got 'sac_elbows1'"):
+            load_policy("sac", elbows=1, seed=seed)
+    with pytest.raises(ValueError, match=r"env must be one of .*, got 'Pendulum-v1'"):
+        load_policy("ppo", env="Pendulum-v1")

@@ -1,0 +1,51 @@
+"""The compiled recursion equals the paper's equations, derived another way, on any arm of the family."""
+
+import numpy as np
+from hypothesis import given, settings
+
+from elbow_gym import LinkParameters, dynamics
+from tests.support.comparisons import assert_close, assume_solvable
+from tests.support.kernel_calls import accelerations_of
+from tests.support.strategies import between, cases
+
+
+@given(cases())
+@settings(max_examples=150)
+def test_fast_form_equals_the_papers_form(case):
+    arm, q, q_dot, current, voltage, elbows = case
+    assume_solvable(dynamics.mass_matrix(arm, q), dynamics.constraint_jacobian(arm, q, elbows))
+    expected = dynamics.forward_dynamics(arm, q, q_dot, current, voltage, elbows)
+    for value, reference, tolerance in zip(accelerations_of(case), expected, (1e-10, 1e-10, 1e-13), strict=True):
+        assert_close(value, reference, tolerance)
+
+
+def extended(case, payload):
+    """The case's arm with one more link, of the payload's mass and no size, at the hand."""
+    speck = LinkParameters(mass=payload, length=1e-12, radius=1e-12)
+    arm = case.arm
+    return type(arm)(
+        links=(*arm.links, speck),
+        motors=(*arm.motors, arm.motors[-1]),
+        joint_viscous_friction=(*arm.joint_viscous_friction, 0.0),
+        nominal_pose=(*arm.nominal_pose, 0.0),
+        gravity=arm.gravity,
+    )
+
+
+@given(cases(largest=8), between(0.01, 5.0))
+def test_a_payload_is_a_last_link_of_no_size_that_never_turns(case, payload):
+    _, q, q_dot, current, _, elbows = case
+    n, p = case.arm.n_joints, len(elbows)
+    arm = extended(case, payload)
+    # Its joint stays locked: the first n equations are those of the arm that carries it.
+    matrix = dynamics.mass_matrix(arm, [*q, 0.0])[:n, :n]
+    bias = dynamics.bias_forces(arm, [*q, 0.0], [*q_dot, 0.0])[:n]
+    jacobian = dynamics.constraint_jacobian(case.arm, q, elbows)
+    assume_solvable(matrix, jacobian)
+    system = np.block([[matrix, -jacobian.T], [jacobian, np.zeros((p, p))]])
+    torque = case.arm.of_motors("joint_torque_constant") * current - bias
+    drift = dynamics.constraint_bias(case.arm, q, q_dot, elbows)
+    expected = np.linalg.solve(system, np.concatenate([torque, -drift]))
+    q_ddot, force, _ = accelerations_of(case, payload)
+    assert_close(q_ddot, expected[:n], 1e-9)
+    assert_close(force, expected[n:], 1e-9)

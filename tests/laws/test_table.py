@@ -1,0 +1,203 @@
+"""Whole runs on the compliant table: it never pulls, no joule is missing, RK4 converges to another integrator."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from elbow_gym import MotorParameters, Simulator, TableParameters, contact, dynamics, kinematics, paper_arm
+from tests.support.arms import inductor_energy, lying, mechanical_energy, small_arm, uneven_arm
+
+ROUGH, SMOOTH = {"friction": 0.3}, {"friction": 0.0}
+DRIVE = {"heat": True, "supply_resistance": 0.2}
+CASES = {
+    "table": {"table": ROUGH},
+    "smooth table": {"table": SMOOTH},
+    "table and elbows": {"elbows": (4, 7), "table": ROUGH},
+    "rubbing elbows": {"elbows": (4, 7), "elbow_friction": 0.3},
+    "drive": {"elbows": (4, 7), **DRIVE},
+    "all": {"elbows": (4, 7), "table": ROUGH, "elbow_friction": 0.2, "payload": 0.3, **DRIVE},
+}
+
+
+def hand_velocity(sim):
+    """Of one arm [m/s], (3,), by central differences."""
+    ahead, behind = (kinematics.hand_position(sim.arm, sim.q[0] + dt * sim.q_dot[0]) for dt in (1e-6, -1e-6))
+    return (ahead - behind) / 2e-6
+
+
+def stored(sim):
+    """Kinetic, potential and elastic energy of one arm, its payload and its inductors [J]."""
+    payload, table = sim.conditions.payload, sim.conditions.surface
+    elastic = contact.contact_energy(sim.arm, table, sim.q[0]).sum() if table else 0.0
+    load = payload * (sim.arm.gravity * sim.hand_position[0, 2] + (hand_velocity(sim) ** 2).sum() / 2.0)
+    return mechanical_energy(sim) + load + elastic + inductor_energy(sim).sum()
+
+
+ALONE = ("rubbing elbows", "drive")
+"""Cases whose kernels no other test has compiled; "all" has all that they have."""
+NAMES = [pytest.param(case, marks=pytest.mark.soak if case in ALONE else ()) for case in CASES]
+
+
+@cache
+def ride(case):
+    """A quarter of a second under random voltages from a pose on the table: the simulator and what it did.
+
+    That is what its stores gained, what sum u i came to by the trapezoidal rule, and contact forces and losses after
+    each step.
+    """
+    options = dict(CASES[case])
+    arm, elbows = uneven_arm(), options.pop("elbows", 0)
+    if "heat" in options:
+        rough = tuple(replace(motor, gear_coulomb_friction=0.002) for motor in arm.motors)
+        arm = replace(arm, motors=rough)
+    sim = Simulator(arm, elbows, timestep=1e-4, **options)
+    rng = np.random.default_rng(4)
+    sim.reset(Simulator(arm, (4, 7)).on_table(arm.nominal_pose))
+    before, fed, forces, losses = stored(sim), 0.0, [], []
+    for _ in range(25):
+        voltage = rng.uniform(-9.0, 9.0, 10)
+        for _ in range(100):
+            power = voltage @ sim.current[0]
+            sim.step(voltage)
+            fed += sim.timestep * (power + voltage @ sim.current[0]) / 2.0
+            forces.append(sim.contact_force[0])
+            losses.append(sim.contact_loss[0].copy())
+    return sim, stored(sim) - before, fed, np.array(forces), np.array(losses)
+
+
+@pytest.mark.parametrize("case", NAMES)
+def test_energy_in_is_stored_or_lost(case):
+    sim, gained, *_ = ride(case)
+    lost = sim.copper_loss.sum() + sim.friction_loss.sum() + sim.contact_loss.sum()
+    assert abs(sim.electrical_energy.sum() - lost - gained) < 1e-6 * sim.drawn_energy.sum()
+    assert sim.drawn_energy.sum() > 30.0
+    if case not in {"drive", "table and elbows"}:
+        assert sim.contact_loss.sum() > 0.05
+
+
+@pytest.mark.parametrize("case", [name for name in NAMES if name.values[0] in ("drive", "all")])
+def test_the_supply_feeds_motors_and_its_own_resistance(case):
+    # V0 I = sum u i, by the trapezoidal rule, is sum v i + R_s I^2.
+    sim, _, fed, *_ = ride(case)
+    assert fed == pytest.approx(sim.electrical_energy.sum() + sim.supply_loss[0], rel=2e-4)
+    assert sim.supply_loss[0] > 1.0
+
+
+@pytest.mark.parametrize("case", NAMES)
+def test_contacts_push_rub_against_the_sliding_and_only_take_energy(case):
+    *_, forces, losses = ride(case)
+    assert (forces[..., 2] >= 0.0).all()
+    assert (np.diff(losses, axis=0) >= 0.0).all()
+    assert forces.any() == ("table" in case or case == "all")
+    rubbing = np.hypot(forces[..., 0], forces[..., 1])
+    friction = CASES[case].get("table", SMOOTH)["friction"]
+    assert (rubbing <= friction * forces[..., 2]).all()
+    assert rubbing.any() == (friction > 0.0)
+
+
+def unpowered(arm, **table):
+    """One arm without motors' braking or any friction of its own, on a table, RK4 at 0.02 ms."""
+    idle = MotorParameters(torque_constant=1e-12, gear_viscous_friction=0.0)
+    loose = replace(arm, motors=(idle,) * arm.n_joints, joint_viscous_friction=(0.0,) * arm.n_joints)
+    return Simulator(loose, 0, timestep=2e-5, table=table)
+
+
+@pytest.mark.parametrize(("dissipation", "friction"), [(0.5, 0.0), (0.0, 0.3), (1.0, 0.3)])
+def test_a_bounce_takes_what_the_contacts_lose_and_never_gives_energy(dissipation, friction):
+    sim = unpowered(small_arm(), stiffness=1e4, dissipation=dissipation, friction=friction)
+    sim.reset(lying(sim.arm, 0.03, 0.02), [0.5, 0.0, 0.0])
+    energies, pressed = [stored(sim)], []
+    for _ in range(250):
+        sim.step(np.zeros(3), 50)
+        energies.append(stored(sim))
+        pressed.append(sim.contact_force[0, :, 2].any())
+    assert np.diff(pressed).sum() > 3
+    # RK4's own error where contact begins.
+    assert np.diff(energies).max() < 1e-7
+    assert energies[0] - energies[-1] == pytest.approx(sim.contact_loss.sum(), abs=1e-6)
+    assert sim.contact_loss.sum() > 0.01
+
+
+def test_an_elastic_smooth_table_gives_back_all_it_took():
+    sim = unpowered(small_arm(), stiffness=1e4, dissipation=0.0)
+    sim.reset(lying(sim.arm, 0.03, 0.02))
+    before, deepest = stored(sim), 0.0
+    for _ in range(250):
+        sim.step(np.zeros(3), 50)
+        deepest = min(deepest, sim.lowest_height[0])
+    assert deepest < -0.001
+    assert stored(sim) == pytest.approx(before, abs=1e-6)
+    assert np.abs(sim.contact_loss).max() < 1e-9
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_dropped_arm_comes_to_rest_at_the_depth_that_carries_it(friction):
+    stiffness = 2e4
+    sim = Simulator(small_arm(), 0, timestep=2e-4, table={"stiffness": stiffness, "friction": friction})
+    sim.reset(lying(sim.arm, 0.05, 0.03))
+    sim.step(np.zeros(3), 20_000)
+    # Joint 3 carries half of both links, the hand half of the last one; the base carries the rest.
+    loads = np.array([(0.4 + 0.2) * 9.81 / 2.0, 0.2 * 9.81 / 2.0])
+    np.testing.assert_allclose(sim.contact_force[0, :, 2], loads, rtol=1e-5)
+    np.testing.assert_allclose(kinematics.joint_positions(sim.arm, sim.q[0])[2:, 2], -loads / stiffness, rtol=1e-5)
+
+
+def test_the_papers_arm_lying_flat_rests_on_every_joint_with_a_links_weight():
+    sim = Simulator(paper_arm(), 0, timestep=1e-3, table=True)
+    sim.reset(np.pi / 2.0 * np.eye(10)[1])
+    sim.step(np.zeros(10), 5000)
+    # Each joint carries half of the two links that meet there, the hand half of the last one.
+    weight = 0.1 * 9.81
+    np.testing.assert_allclose(sim.contact_force[0, :, 2], [weight] * 8 + [weight / 2.0], rtol=1e-4)
+    assert sim.below_table[0] == 0.0
+
+
+def test_runs_converge_to_the_reference_equations_integrated_elsewhere():
+    arm, table = small_arm(), TableParameters(stiffness=2e4, friction=0.3)
+    start, q_dot = lying(arm, 0.003, 0.001), np.array([1.0, 0.5, 0.4])
+    voltage = np.array([0.5, -1.0, 0.8])
+
+    def rates(_, state):
+        q, q_dot, current = state.reshape(3, 3)
+        found = dynamics.forward_dynamics(arm, q, q_dot, current, voltage, table=table)
+        return np.concatenate([q_dot, found.q_ddot, found.current_dot])
+
+    first = np.concatenate([start, q_dot, np.zeros(3)])
+    # Short steps find the instants at which contact begins and ends.
+    exact = solve_ivp(rates, (0.0, 0.02), first, method="DOP853", rtol=1e-11, atol=1e-12, max_step=4e-4).y[:, -1]
+    for timestep, error in ((1e-3, 3e-4), (1e-4, 3e-5), (1e-5, 2e-6)):
+        sim = Simulator(arm, 0, timestep=timestep, table=table)
+        sim.reset(start, q_dot)
+        sim.step(voltage, round(0.02 / timestep))
+        found = np.concatenate([sim.q[0], sim.q_dot[0], sim.current[0]])
+        np.testing.assert_allclose(found, exact, rtol=0.0, atol=error)
+    assert sim.contact_loss.sum() > 1e-3
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("elbows", [0, 2])
+def test_the_table_never_pulls_through_seconds_of_full_voltage(elbows, friction):
+    sim = Simulator("paper", elbows, 32, timestep=1e-3, table={"friction": friction})
+    rng, loss, pressed = np.random.default_rng(1), sim.contact_loss.copy(), 0.0
+    for k in range(150):
+        bang = 24.0 * rng.choice([-1.0, 1.0], (32, 10))
+        sim.step(bang if k % 2 else rng.uniform(-24.0, 24.0, (32, 10)), 20)
+        assert sim.valid.all()
+        assert (sim.contact_force[..., 2] >= 0.0).all()
+        assert (sim.contact_loss >= loss).all()
+        loss, pressed = sim.contact_loss.copy(), pressed + sim.contact_force[..., 2].sum()
+    assert pressed > 100.0
+
+
+@pytest.mark.parametrize(
+    ("table", "limit"), [(True, "0.001"), ({"stiffness": 1e3}, "0.001"), ({"stiffness": 4e5}, "0.0005")]
+)
+def test_a_step_too_long_for_the_table_is_refused(table, limit):
+    with pytest.raises(
+        ValueError, match=rf"^timestep must be at most {limit} s \(RK4's limit for the table\), got 0.002$"
+    ):
+        Simulator("paper", 0, timestep=0.002, table=table)
+    Simulator("paper", 0, timestep=float(limit), table=table)

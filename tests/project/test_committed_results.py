@@ -1,0 +1,149 @@
+"""Committed results agree with each other, with the code that makes them, and with what is said of them.
+
+Red here means that a result is older than the code or than another result: regenerate it, with `python -m benchmarks
+energy`, `python -m benchmarks optimal`, or a training and `python -m agents publish`.
+"""
+
+import csv
+
+import numpy as np
+import pytest
+
+from agents.control.trajectory import OpenLoop, Trajectory
+from agents.evaluation.metrics import REGIMES, UNITS
+from agents.learning.evaluation import evaluation
+from agents.optimal.bound import rollout
+from agents.shipped import seeds as shipped
+from agents.shipped.seeds import load_policy, shipped_policies
+from agents.style import CONTROLLER_NAMES
+from benchmarks.energy import breakdown, pareto
+from benchmarks.energy import cells as lineup
+from benchmarks.machine import RESULTS
+from benchmarks.optimal import FRONT_WEIGHTS, Cell, cached, cells, files
+from elbow_gym import ElbowArmEnv
+from elbow_gym.baselines import policy as baselines
+from elbow_gym.baselines.policy import pair, read_policy
+from elbow_gym.baselines.tasks import task_name
+from elbow_gym.kinematics import joint_positions
+
+
+def committed():
+    with (RESULTS / "energy.csv").open() as handle:
+        return list(csv.DictReader(handle))
+
+
+def test_committed_results_hold_every_cell_and_regime():
+    found = {(row["controller"], int(row["elbows"]), row["regime"]) for row in committed()}
+    nominal = [cell for cell in lineup.cells() if cell.part == "nominal"]
+    assert found == {(cell.controller, cell.elbows, regime.name) for cell in nominal for regime in REGIMES}
+
+
+def test_committed_table_is_made_of_the_committed_figures():
+    lines = (RESULTS / "energy.md").read_text().splitlines()[2:]
+    for line, row in zip(lines, committed(), strict=True):
+        entries = [entry.strip() for entry in line.strip("|").split("|")]
+        value = float(row["electrical_energy [J]"])
+        assert float(entries[3].split()[0]) == pytest.approx(value, rel=1e-3)
+        assert float(entries[5].split()[0]) == pytest.approx(float(row["error_rms [mm]"]), rel=1e-3)
+    assert set(UNITS) <= {name.split(" ")[0] for name in committed()[0]}
+
+
+def test_committed_brief_table_puts_the_regimes_of_the_committed_figures_side_by_side():
+    by_key = {(row["elbows"], CONTROLLER_NAMES[row["controller"]], row["regime"]): row for row in committed()}
+    lines = [line.strip("| ").split(" | ") for line in (RESULTS / "energy_brief.md").read_text().splitlines()[2:]]
+    assert 3 * len(lines) == len(by_key)
+    for elbows, name, gain, _, whole, steady, error, on_target, _ in lines:
+        for cell, regime, column in (
+            (gain, "A", "return [-]"),
+            (whole, "A", "electrical_energy [J]"),
+            (steady, "B", "electrical_energy [J]"),
+            (error, "B", "error_rms [mm]"),
+            (on_target, "C", "electrical_energy [J]"),
+        ):
+            assert float(cell.split()[0]) == pytest.approx(float(by_key[elbows, name, regime][column]), rel=1e-3)
+    order = [(int(line[0]), float(line[2].split()[0])) for line in lines]
+    assert order == sorted(order, reverse=True)
+
+
+def test_committed_shifted_results_hold_every_shifted_cell_and_regime():
+    with (RESULTS / "energy_shifted.csv").open() as handle:
+        found = {(row["controller"], int(row["elbows"]), row["regime"]) for row in csv.DictReader(handle)}
+    shifted = [cell for cell in lineup.cells() if cell.part == "shifted"]
+    assert found == {(cell.controller, cell.elbows, regime) for cell in shifted for regime in "AB"}
+
+
+def test_the_front_has_a_point_for_every_price_of_power_and_none_from_under_the_table():
+    for elbows in (2, 1, 0):
+        points = pareto.front(elbows)
+        assert len(points) == 1 + len(FRONT_WEIGHTS)
+        assert np.all(np.diff([energy for _, energy in points]) < 0.0)
+
+
+def test_lqr_stays_within_five_percent_of_the_bound_at_every_elbow_count():
+    gaps = {int(row["elbows"]): row for row in committed() if row["controller"] == "lqr" and row["regime"] == "A"}
+    assert sorted(gaps) == [0, 1, 2]
+    for row in gaps.values():
+        assert float(row["optimality_gap [-]"]) < 0.05
+
+
+def test_committed_breakdown_sums_to_the_energy_that_the_benchmark_found():
+    papers = {row["elbows"]: row for row in committed() if row["controller"] == "pd_paper" and row["regime"] == "A"}
+    with (RESULTS / "breakdown.csv").open() as handle:
+        rows = list(csv.DictReader(handle))
+    for elbows in ("0", "1", "2"):
+        sums = {row["part"]: float(row["sum [J]"]) for row in rows if row["elbows"] == elbows}
+        assert sum(sums[part] for part in breakdown.PARTS) == pytest.approx(sums["whole"], rel=1e-4)
+        assert sums["whole"] == pytest.approx(float(papers[elbows]["electrical_energy [J]"]), rel=0.01)
+
+
+def test_what_may_go_under_the_table_does_and_is_better_for_it(arm):
+    for elbows in (1, 0):
+        held, free = Cell(elbows), Cell(elbows, under=True)
+        lowest = {cell: joint_positions(arm, Trajectory.load(files(cell)[1]).q)[..., 2].min() for cell in (held, free)}
+        assert lowest[free] < -0.1 < -1e-3 < lowest[held]
+        assert cached(free)["closed_loop"] < cached(held)["closed_loop"]
+
+
+@pytest.mark.parametrize("cell", [cell for cell in cells() if cached(cell)], ids=lambda cell: cell.name)
+def test_committed_trajectory_repeats_its_cost_in_the_simulator(cell):
+    figures, trajectory = cached(cell), Trajectory.load(files(cell)[1])
+    found, _ = rollout(cell.problem.settings, lambda env: OpenLoop(env, trajectory))
+    assert -found == pytest.approx(figures["closed_loop"], rel=1e-4)
+    assert -found == pytest.approx(figures["predicted_cost"], rel=0.02)
+
+
+def test_every_shipped_policy_loads_fits_and_is_small():
+    assert "ppo_elbows2_seed0" in shipped_policies()
+    files = [path for folder in (baselines.BASELINES, shipped.POLICIES) for path in folder.iterdir()]
+    assert sum(path.stat().st_size for path in files) <= 12_000_000
+    assert {path.suffix for path in files} == {".json", ".safetensors"}
+    for path in (path.with_suffix("") for path in files if path.suffix == ".json"):
+        policy = read_policy(path)
+        policy.check(ElbowArmEnv(**policy.card.environment))
+        assert sum(part.stat().st_size for part in pair(path)) < 300_000
+        assert policy.card.command.startswith(("python -m agents train", "python -m agents clone"))
+        task = task_name(policy.card.env, policy.card.environment["elbows"])
+        assert path.name.startswith(policy.card.algorithm)
+        assert path.name.endswith(f"{task}_seed{policy.card.training['seed']}")
+
+
+def test_baseline_is_the_best_seed_and_no_policy_is_stored_twice():
+    names = shipped_policies()
+    assert len(set(names)) == len(names)
+    groups = {name.rpartition("_seed")[0] for name in names}
+    assert baselines.baseline_names() == sorted(groups)
+    for group in groups:
+        merits = [
+            read_policy(shipped.shipped_path(group, k)).card.evaluation["return"] for k in shipped.shipped_seeds(group)
+        ]
+        assert read_policy(baselines.baseline_path(group)).card.evaluation["return"] == max(merits)
+
+
+def test_shipped_two_elbow_policy_holds_its_promise():
+    policy = load_policy("ppo", elbows=2)
+    figures = evaluation(policy, policy.settings)
+    assert figures["electrical_energy"] <= 250.0
+    assert figures["steady_error_rms_mm"] <= 5.0
+    for name in figures.keys() & policy.card.evaluation.keys():
+        np.testing.assert_allclose(policy.card.evaluation[name], figures[name], rtol=1e-3)
+    assert policy.card.training["seconds"] <= 600
