@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, kernel
+from tests.support.kernel_calls import NOTHING
 
 MODES = list(AutoresetMode)
 RESETTING = [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP]
@@ -217,7 +218,7 @@ def test_neither_memory_order_nor_precision_of_the_actions_changes_a_bit_or_has_
     for one in (env, twin):
         one.reset(seed=0)
     expected = [twin.step(action) for action in actions(3, 3)]
-    compiled = [kernel.drive, kernel.kernel(kernel.BLOCK_LANES).advance]
+    compiled = [kernel.drive, kernel.kernel(kernel.BLOCK_LANES, **NOTHING).advance]
     before = [entry.signatures for entry in compiled]
     assert same([env.step(order(action)) for action in actions(3, 3)], expected)
     assert [entry.signatures for entry in compiled] == before
