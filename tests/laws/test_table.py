@@ -55,7 +55,7 @@ def ride(case):
         arm = replace(arm, motors=rough)
     sim = Simulator(arm, elbows, timestep=1e-4, **options)
     rng = np.random.default_rng(4)
-    sim.reset(Simulator(arm, (4, 7)).on_table(arm.nominal_pose))
+    sim.reset(Simulator(uneven_arm(), (4, 7)).on_table(arm.nominal_pose))
     before, fed, forces, losses = stored(sim), 0.0, [], []
     for _ in range(25):
         voltage = rng.uniform(-9.0, 9.0, 10)

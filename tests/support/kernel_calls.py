@@ -12,8 +12,9 @@ from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 
 ELBOWS = (4, 7)
-EVERYTHING = {"table": True, "rubbing": True, "drive": True}
-"""The switches of the kernel that has them all on."""
+NOTHING = {"table": False, "rubbing": False, "drive": False}
+"""Switches as the simulator names them: asked for in another way, a kernel is another copy, and compiled again."""
+EVERYTHING = dict.fromkeys(NOTHING, True)
 
 _build = kernel.__wrapped__
 
@@ -39,7 +40,7 @@ def accelerations(lanes, state, parameters, voltage, elbows, make=kernel, **swit
     """The kernel's q_ddot, elbow forces and current rates of a batch; `make` is what gives the kernel's entries."""
     q_ddot, current_dot, force = np.zeros_like(voltage), np.zeros_like(voltage), np.zeros((len(voltage), len(elbows)))
     joints = np.array(elbows, dtype=np.int64)
-    make(lanes, **switches).accelerations(state, parameters, voltage, joints, q_ddot, current_dot, force)
+    make(lanes, **(NOTHING | switches)).accelerations(state, parameters, voltage, joints, q_ddot, current_dot, force)
     return q_ddot, force, current_dot
 
 
@@ -64,5 +65,5 @@ def advanced(lanes, size, n_steps=20, elbows=ELBOWS):
     state, parameters, voltage = batch(size)
     summary = np.zeros((size, SUMMARY_COLUMNS + len(elbows)))
     joints = np.array(elbows, dtype=np.int64)
-    kernel(lanes).advance(state, parameters, voltage, joints, 0, size, n_steps, 0.001, summary)
+    kernel(lanes, **NOTHING).advance(state, parameters, voltage, joints, 0, size, n_steps, 0.001, summary)
     return np.concatenate([state.reshape(size, -1), summary], axis=1)
