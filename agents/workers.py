@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
 Tell = Callable[[int], Any]
-"""Told the units of work done since it was last told."""
+"""Function called with the units of work done since its last call."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""`python -m benchmarks learning`: curves against steps and seconds, and how long the PD took to be beaten."""
+"""Learning curves against control periods and seconds, and the time until the PD was beaten."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ Array = NDArray[np.float64]
 POINTS = 200
 TASKS = {**{f"elbows{elbows}": ELBOW_NAMES[elbows] for elbows in (2, 1, 0)}, "table": "table", "random": "drawn arms"}
 AXES = {"steps": "control periods", "training_seconds": "seconds of training, one core a seed"}
-"""Columns of the curves that are shown against, and what they are."""
+"""Labels of the horizontal axes by column of the curves."""
 
 
 class Goal(NamedTuple):
-    """What the PD spends in regime A [J] and misses by in regime B [mm]; beaten is who is below both."""
+    """Energy of the PD in regime A [J] and its error in regime B [mm]; below both it is beaten."""
 
     energy: float
     error: float
@@ -104,7 +104,7 @@ HEADER = ("controller", "task", "seeds", "beat the PD", "steps", "training secon
 
 
 def table(curves: Sequence[Curve], results: Path) -> list[tuple[str, ...]]:
-    """For each controller and task: how many seeds beat the PD on energy and error both, and when (median)."""
+    """Number of seeds that beat the PD in both energy and error, and when (median), for each controller and task."""
     known, rows = goals(results), []
     for controller, task in _groups(curves):
         chosen = [curve for curve in curves if (curve.controller, curve.task) == (controller, task)]

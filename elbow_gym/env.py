@@ -37,7 +37,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     The arm of the multi-point-elbow paper: joint 1 yaws, joints 2 to 10 pitch in the vertical plane that the yaw
     selects, each driven by a DC servo motor through a gear. Up to several *elbows* (joints held at z = 0 by the
-    table) carry the arm's weight. The hand has to follow a circle; the price is electrical energy.
+    table) carry the arm's weight. The hand has to follow a circle; the cost is electrical energy.
 
     ## Action Space
 

@@ -1,4 +1,4 @@
-"""What leaning on a table that cannot pull costs and bears, in one picture."""
+"""Figure of the runs on a table that cannot pull: energy, error, hand and forces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Runs = Mapping[float, TableRecording]
 COLOURS = dict(zip(LIFTS, ELBOW_COLOURS.values(), strict=True))
 NAMES = {"joints 4 and 7": "leaning on joints 4 and 7", "joint 4": "leaning on joint 4", "clear": "held clear"}
 PICTURE_PERIOD = 0.005
-"""Between the points of the curves [s]."""
+"""Time between the points of the curves [s]."""
 
 
 def table_figure(runs: Runs) -> Any:

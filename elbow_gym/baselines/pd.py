@@ -61,10 +61,9 @@ class PDController:
         self, observation: NDArray[np.float32], *_args: Any, **_kwargs: Any
     ) -> tuple[NDArray[np.float32], None]:
         """Actions (..., n) for observations (..., size)."""
-        observed = self._layout.decode(observation)
-        cosine, sine = observed["target_angle"][..., 0], observed["target_angle"][..., 1]
+        seen = self._layout.decode(observation)
+        cosine, sine = seen["target_angle"][..., 0], seen["target_angle"][..., 1]
         q_d, q_d_dot = self.desired(np.arctan2(sine, cosine))
-        voltage = self.kp * (q_d - self._pose - observed["joint_angle"])
-        voltage += self.kd * (q_d_dot - observed["joint_velocity"])
+        voltage = self.kp * (q_d - self._pose - seen["joint_angle"]) + self.kd * (q_d_dot - seen["joint_velocity"])
         action = np.clip(voltage / self._volts, -self._highest, self._highest)
         return action.astype(np.float32), None
