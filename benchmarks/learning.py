@@ -45,7 +45,7 @@ class Curve:
     """Columns by name as in `agents.learning.evaluation.COLUMNS`, each of shape (evaluations,)."""
 
     def beats(self, goal: Goal) -> dict[str, float] | None:
-        """Steps and seconds at the first evaluation that is below both figures of the PD; None when none is."""
+        """Steps and seconds at the first evaluation that is below the PD in both metrics; None when none is."""
         below = (self.columns["electrical_energy"] < goal.energy) & (self.columns["steady_error_rms_mm"] < goal.error)
         if not below.any():
             return None
@@ -79,7 +79,7 @@ def together(curves: Sequence[Curve], against: str, what: str = "return") -> tup
 
 
 def goals(results: Path) -> dict[str, Goal]:
-    """The PD's figures by task, as far as the energy benchmark has them."""
+    """Goals by task, as far as the energy benchmark has the PD's metrics."""
     rows = _pd_rows(results)
     return {
         task: Goal(float(rows[task, "A"]["electrical_energy [J]"]), float(rows[task, "B"]["error_rms [mm]"]))
@@ -174,7 +174,7 @@ def _mark(ax: Any, task: str, papers: Mapping[tuple[str, str], Mapping[str, str]
 def save(results: Path = RESULTS, folder: Path = CURVES) -> list[tuple[str, ...]]:
     """Writes learning.png, learning.csv and learning.md into `results` from the curves in `folder`, if there are any.
 
-    The PD's figures are those of energy.csv and energy_table.csv in `results`.
+    The PD's metrics are those of energy.csv and energy_table.csv in `results`.
     """
     curves = load(folder)
     if not curves:

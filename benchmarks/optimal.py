@@ -78,12 +78,12 @@ def cells(front: bool = True) -> list[Cell]:
 
 
 def files(cell: Cell, optima: Path = OPTIMA) -> tuple[Path, Path]:
-    """A cell's figures (JSON) and its trajectory (npz)."""
+    """Files of a problem: its metrics (JSON) and its trajectory (npz)."""
     return optima / f"{cell.name}.json", optima / f"{cell.name}.npz"
 
 
 def cached(cell: Cell, optima: Path = OPTIMA) -> dict[str, Any] | None:
-    """The figures of an earlier run of the same problem, or None."""
+    """Metrics of an earlier run of the same problem, or None."""
     card, trajectory = files(cell, optima)
     if not (card.is_file() and trajectory.is_file()):
         return None

@@ -156,7 +156,7 @@ def measure(run: Recording) -> dict[str, Any]:
 
 
 def case_numbers(runs: Mapping[str, Mapping[str, Any]]) -> Numbers:
-    """One case from the figures of its `RUNS`."""
+    """Numbers of one case from those of its `RUNS`."""
     return Numbers(**runs["paper"], energy_on_target=runs["on target"]["energy"], energy_clipped=runs["24 V"]["energy"])
 
 

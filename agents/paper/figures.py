@@ -1,4 +1,4 @@
-"""The paper's figures 1 to 25, panel by panel, one overview of them, and the series that they draw."""
+"""Figures 1 to 25 of the paper, panel by panel, one overview of them, and the series that they draw."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ PICTURE_PERIOD = 0.005
 
 
 def table_figure(runs: Runs) -> Any:
-    """Above, energy and error by start and friction; below, the hand of the leaning arm and what the table bears."""
+    """Above, energy and error by start and friction; below, the hand of the leaning arm and the table's forces."""
     numbers = {friction: dict(zip(LIFTS, measure_on_table(run), strict=True)) for friction, run in runs.items()}
     fig, grid = pyplot().subplots(2, 3, figsize=(10.0, 6.4), layout="constrained")
     for panel, name, title in zip(

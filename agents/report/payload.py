@@ -100,7 +100,7 @@ def payload(runs: Sequence[Run], results: Path) -> dict[str, Any]:
 
 
 def panels(series: Recording) -> list[dict[str, Any]]:
-    """The paper's figures in order: number, title, kind and what they draw."""
+    """Figures of the paper in order: number, title, kind and series."""
     drawn: list[dict[str, Any]] = []
     for number, (first, second) in enumerate(VIEWS, start=1):
         plane = f"{'xyz'[first]}-{'xyz'[second]}"

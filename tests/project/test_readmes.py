@@ -5,6 +5,7 @@ import inspect
 import json
 import math
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -91,6 +92,14 @@ def test_commands_that_a_page_names_exist(page):
     known = {"agents": agents_app.help(), "benchmarks": benchmarks_app.help()}
     for program, command in re.findall(r"python -m (agents|benchmarks) ([a-z]+)", PAGES[page]):
         assert re.search(rf"^  {command} ", known[program], flags=re.MULTILINE), (program, command)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_command_lines_of_the_agents_that_a_page_quotes_are_accepted(page):
+    quoted = re.findall(r"(?:^|`)python -m agents ([a-z][^`\n]*)", PAGES[page], flags=re.MULTILINE)
+    for line in quoted:
+        agents_app.parse(shlex.split(line))
+    assert len(quoted) >= {"README.md": 4, "agents/README.md": 10}.get(page, 0)
 
 
 def energy(file="energy.csv"):
