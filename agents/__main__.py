@@ -20,9 +20,9 @@ def reproduce(output: Path = Path("reproduction"), publish: bool = False, table:
 
     Args:
         output: Folder for figures, CSV files and the verdict.
-        publish: Whether to refresh the README's picture and the committed numbers too.
-        table: Whether to ask instead if leaning on a real table, which gives way and cannot pull, saves energy: three
-            start poses under three frictions.
+        publish: Whether to refresh the pictures of the READMEs and the committed numbers too.
+        table: Whether to play on a compliant table instead, which cannot pull, from three start poses under three
+            frictions, with a verdict on whether leaning saves energy.
     """
     if table:
         from agents.paper.table_claims import reproduce_on_table
@@ -102,7 +102,7 @@ def evaluate(
 
 @app.command
 def report(output: Path = Path("report.html")) -> None:
-    """One HTML file to look at: every controller's run to replay, the paper's Figs 1-25 and the benchmark.
+    """Writes one HTML page: replays of every controller, the paper's Figs 1-25 and the benchmark.
 
     Args:
         output: File of the page, which opens without a network.

@@ -1,4 +1,4 @@
-"""The paper's PD controller, which lives in `elbow_gym.baselines.pd`."""
+"""PD controller of the paper, from `elbow_gym.baselines.pd`."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ WITHOUT_KERNEL: dict[str, Any] = {
 
 T = TypeVar("T")
 Tell = Callable[[int], Any]
-"""Told the units of work done since it was last told."""
+"""Function called with the units of work done since its last call."""
 
 
 class _WithoutNotice:

@@ -1,1 +1,1 @@
-"""What is measured and how: `python -m benchmarks`."""
+"""Benchmarks of energy, learning, the optimum and speed: `python -m benchmarks`."""

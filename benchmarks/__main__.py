@@ -8,7 +8,7 @@ from agents.cli import Commands, Count
 from agents.shipped import CURVES, OPTIMA
 from benchmarks.machine import LATEST, RESULTS
 
-app = Commands("python -m benchmarks", "Benchmarks: what motion costs, how agents learn, the optimum, the speed.")
+app = Commands("python -m benchmarks", "Benchmarks of energy, learning, the optimum and the simulator's speed.")
 
 
 @app.command
@@ -34,7 +34,7 @@ def energy(
 
 @app.command
 def learning(output: Path = RESULTS, curves: Path = CURVES) -> None:
-    """The learning curves against steps and seconds, and when the PD was beaten: figure, CSV and table.
+    """Learning curves against control periods and seconds, and when the PD was beaten: figure, CSV and table.
 
     Args:
         output: Folder of the results, with energy.csv.
@@ -50,14 +50,14 @@ def learning(output: Path = RESULTS, curves: Path = CURVES) -> None:
 def optimal(
     output: Path = RESULTS, optima: Path = OPTIMA, fresh: bool = False, workers: Count = 2, front: bool = True
 ) -> None:
-    """The best possible return for each elbow count, the same under the table, and the front of energy against error.
+    """Best known return for each elbow count, also with the space under the table, and the front of energy and error.
 
     Args:
         output: Folder for the summary.
         optima: Folder of the solutions; problems that were solved there before are kept.
         fresh: Whether to solve everything again.
         workers: Number of processes; each solves one problem at a time.
-        front: Whether to solve for the energy weights beside the default one too.
+        front: Whether to solve for other energy weights than the default one too.
     """
     from benchmarks.optimal import optimal as solve_optimal
 
@@ -70,7 +70,7 @@ def speed(output: Path = RESULTS, quick: bool = False) -> None:
 
     Args:
         output: Folder for the results.
-        quick: Whether to take few and short samples, which show that all works.
+        quick: Whether to take few and short samples, which show that everything runs.
     """
     from benchmarks.speed.run import speed as measure_speed
 

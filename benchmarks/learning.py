@@ -1,4 +1,4 @@
-"""`python -m benchmarks learning`: curves against steps and seconds, and how long the PD took to be beaten."""
+"""Learning curves against control periods and seconds, and the time until the PD was beaten."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ Array = NDArray[np.float64]
 POINTS = 200
 TASKS = {**{f"elbows{elbows}": ELBOW_NAMES[elbows] for elbows in (2, 1, 0)}, "table": "table", "random": "drawn arms"}
 AXES = {"steps": "control periods", "training_seconds": "seconds of training, one core a seed"}
-"""Columns of the curves that are shown against, and what they are."""
+"""Labels of the horizontal axes by column of the curves."""
 
 
 class Goal(NamedTuple):
-    """What the PD spends in regime A [J] and misses by in regime B [mm]; beaten is who is below both."""
+    """Energy of the PD in regime A [J] and its error in regime B [mm]; below both it is beaten."""
 
     energy: float
     error: float
@@ -45,7 +45,7 @@ class Curve:
     """Columns by name as in `agents.learning.evaluation.COLUMNS`, each of shape (evaluations,)."""
 
     def beats(self, goal: Goal) -> dict[str, float] | None:
-        """Steps and seconds at the first evaluation that is below both figures of the PD; None when none is."""
+        """Steps and seconds at the first evaluation that is below the PD in both metrics; None when none is."""
         below = (self.columns["electrical_energy"] < goal.energy) & (self.columns["steady_error_rms_mm"] < goal.error)
         if not below.any():
             return None
@@ -79,7 +79,7 @@ def together(curves: Sequence[Curve], against: str, what: str = "return") -> tup
 
 
 def goals(results: Path) -> dict[str, Goal]:
-    """The PD's figures by task, as far as the energy benchmark has them."""
+    """Goals by task, as far as the energy benchmark has the PD's metrics."""
     rows = _pd_rows(results)
     return {
         task: Goal(float(rows[task, "A"]["electrical_energy [J]"]), float(rows[task, "B"]["error_rms [mm]"]))
@@ -104,7 +104,7 @@ HEADER = ("controller", "task", "seeds", "beat the PD", "steps", "training secon
 
 
 def table(curves: Sequence[Curve], results: Path) -> list[tuple[str, ...]]:
-    """For each controller and task: how many seeds beat the PD on energy and error both, and when (median)."""
+    """Number of seeds that beat the PD in both energy and error, and when (median), for each controller and task."""
     known, rows = goals(results), []
     for controller, task in _groups(curves):
         chosen = [curve for curve in curves if (curve.controller, curve.task) == (controller, task)]
@@ -174,7 +174,7 @@ def _mark(ax: Any, task: str, papers: Mapping[tuple[str, str], Mapping[str, str]
 def save(results: Path = RESULTS, folder: Path = CURVES) -> list[tuple[str, ...]]:
     """Writes learning.png, learning.csv and learning.md into `results` from the curves in `folder`, if there are any.
 
-    The PD's figures are those of energy.csv and energy_table.csv in `results`.
+    The PD's metrics are those of energy.csv and energy_table.csv in `results`.
     """
     curves = load(folder)
     if not curves:

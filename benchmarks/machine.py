@@ -1,4 +1,4 @@
-"""What stands beside every result: the machine and the versions that made it."""
+"""Machine and versions of libraries, which are written beside every result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`python -m benchmarks optimal`: the bound for each elbow count, also without the table, and the front around it."""
+"""Bound on the return for each elbow count, also without the table, and the front around it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MAKER = "python -m benchmarks optimal"
 
 @dataclass(frozen=True)
 class Cell:
-    """One problem of the benchmark."""
+    """Problem of the benchmark."""
 
     elbows: int
     start: str = "paper"
@@ -43,7 +43,7 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """Its files' name."""
+        """Name of the problem's files."""
         target = "_on_target" if self.start == "on_target" else ""
         weight = f"_weight{self.energy_weight:g}" if self.energy_weight != DEFAULT_WEIGHT else ""
         under = "_under" if self.under else ""
@@ -53,20 +53,20 @@ class Cell:
     def problem(self) -> Problem:
         """The default environment from a start without noise; with fewer than two elbows no joint under the table.
 
-        With two elbows the arm lies on the table all the same; with fewer, the space under it is worth nothing to a
-        user. What it is worth to the reward is what the cells with `under` say.
+        With two elbows the arm lies on the table anyway; with fewer, the space under it is worth nothing to a user. The
+        problems with `under` tell what it is worth to the reward.
         """
         settings = Settings(elbows=self.elbows, start=self.start, energy_weight=self.energy_weight, start_noise=0.0)
         return Problem(settings, above_table=self.elbows < 2 and not self.under)
 
     @property
     def parent(self) -> Cell | None:
-        """The cell whose solution it starts from, or None."""
+        """Problem whose solution this one starts from, or None."""
         return Cell(self.elbows, self.start) if self.under or self.energy_weight != DEFAULT_WEIGHT else None
 
     @property
     def question(self) -> dict[str, Any]:
-        """The problem in JSON types: a result is taken over only where this is the same."""
+        """Question in JSON types; a stored result is used only where its question is the same."""
         problem = self.problem
         return json.loads(json.dumps({**problem.settings.arguments, "above_table": problem.above_table}))
 
@@ -79,12 +79,12 @@ def cells(front: bool = True) -> list[Cell]:
 
 
 def files(cell: Cell, optima: Path = OPTIMA) -> tuple[Path, Path]:
-    """A cell's figures (JSON) and its trajectory (npz)."""
+    """Files of a problem: its metrics (JSON) and its trajectory (npz)."""
     return optima / f"{cell.name}.json", optima / f"{cell.name}.npz"
 
 
 def cached(cell: Cell, optima: Path = OPTIMA) -> dict[str, Any] | None:
-    """The figures of an earlier run of the same problem, or None."""
+    """Metrics of an earlier run of the same problem, or None."""
     card, trajectory = files(cell, optima)
     if not (card.is_file() and trajectory.is_file()):
         return None

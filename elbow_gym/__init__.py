@@ -58,9 +58,9 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-# The table alone carries the arm: the policy decides where to brace.
+# The table alone carries the arm, so that the policy decides where to brace.
 TABLE: dict[str, Any] = {"elbows": 0, "table": True}
-# An arm and a circle that nobody has met before.
+# Arm and circle differ in every episode.
 RANDOM: dict[str, Any] = {
     "circle": {
         "center": [[1.45, 1.55], [1.45, 1.55], [0.35, 0.45]],

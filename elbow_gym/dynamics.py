@@ -169,8 +169,8 @@ def _rubbing_force(matrix: Array, right: Array, drag: Array) -> Array:
     """Elbow forces f_n [N], shape (p,), that agree with the friction they cause on the elbows that push.
 
     Friction enters the columns of the *active* elbows, at first those that push without friction, then those that
-    push with it, until they stay the same. Under strong friction they may not; whoever calls then holds the friction of
-    the last round, which still opposes the sliding.
+    push with it, until they stay the same. Under strong friction they may not; the result is then the one with the
+    friction of the last round, which still opposes the sliding.
     """
     n, p = drag.shape
     force = np.linalg.solve(matrix, right)[n : n + p]

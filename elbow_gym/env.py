@@ -1,4 +1,4 @@
-"""ElbowArmEnv: one arm as a Gymnasium environment, the batch with a single arm."""
+"""Gymnasium environment of one arm: the batch of arms with a single one."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from elbow_gym.task.settings import Settings
 
 
 def action_space(episodes: Episodes) -> spaces.Space[NDArray[np.float32]]:
-    """The action space of one arm."""
+    """Action space of one arm: `Box` (n,), float32."""
     high = np.float32(episodes.highest_action)
     return cast("spaces.Space[NDArray[np.float32]]", spaces.Box(-high, high, (episodes.arm.n_joints,), np.float32))
 
 
 def observation_space(episodes: Episodes) -> spaces.Space[NDArray[np.float32]]:
-    """The observation space of one arm."""
+    """Observation space of one arm: `Box` (size,), float32."""
     high = episodes.layout.high
     return cast("spaces.Space[NDArray[np.float32]]", spaces.Box(-high, high, dtype=np.float32))
 
@@ -37,7 +37,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     The arm of the multi-point-elbow paper: joint 1 yaws, joints 2 to 10 pitch in the vertical plane that the yaw
     selects, each driven by a DC servo motor through a gear. Up to several *elbows* (joints held at z = 0 by the
-    table) carry the arm's weight. The hand has to follow a circle; the price is electrical energy.
+    table) carry the arm's weight. The hand has to follow a circle; the cost is electrical energy.
 
     ## Action Space
 
@@ -70,8 +70,8 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Rewards
 
-    `-(tracking_weight * |hand - target| + energy_weight * P)` per control step: the distance [m] at the end of the
-    step, and the mean electrical power P [W] over it, so that by default one watt weighs as much as one millimetre.
+    `-(tracking_weight * |hand - target| + energy_weight * P)` per control period: the distance [m] at its end
+    and the mean electrical power P [W] over it, so that by default one watt costs as much as one millimetre.
     The two terms are in `info` as `reward_tracking` and `reward_energy`.
 
     ## Starting State
@@ -79,7 +79,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     The paper's start pose (or, with `start="on_target"`, the pose with the hand on the circle) at rest without
     current, plus normal noise of `start_noise` rad per joint, projected onto the elbows' plane.
     `reset(options={"state": {"q": ..., "q_dot": ..., "current": ...}, "phase": ...})` sets it exactly; the options
-    `circle` and `parameters` (dicts) stand in for what would be drawn.
+    `circle` and `parameters` (dicts) replace what would be drawn.
 
     ## Episode End
 
@@ -92,7 +92,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     |----------|---------|---------|
     | elbows | 2 | 0, 1, 2 as in the paper (joints (), (4,), (4, 7)), or a tuple of joint numbers |
     | arm | "paper" | preset name, an `ArmParameters`, or its JSON dict |
-    | control_frequency | 50.0 | how often an action is read [Hz] |
+    | control_frequency | 50.0 | control periods, each with one action, per second [Hz] |
     | timestep | None | longest RK4 step [s]: 0.002, with a table 0.001 |
     | duration | 5.0 | episode length [s] |
     | voltage_limit | 24.0 | supply voltage of every motor [V] |
@@ -106,20 +106,20 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | table | False | a compliant table that cannot pull: True, or a dict of stiffness, dissipation, friction... |
     | elbow_friction | 0.0 | Coulomb's coefficient of rigid elbows, where they push |
     | gear_coulomb_friction | None | Coulomb friction of every gear at the motor shaft [N m] |
-    | heat | False | whether windings warm up, and their resistance with them |
-    | supply_resistance | 0.0 | inside the motors' common supply [ohm] |
+    | heat | False | whether windings warm up and their resistance grows |
+    | supply_resistance | 0.0 | resistance inside the motors' common supply [ohm] |
     | payload | 0.0 | mass at the hand [kg] |
     | randomize | None | dict of ranges drawn anew at each reset, see `elbow_gym.task.randomization` |
 
-    Beside them `render_mode` ("rgb_array" or "human", None by default), `render_width` (640) and `render_height` (480)
-    choose the picture.
+    `render_mode` ("rgb_array" or "human", None by default), `render_width` (640) and `render_height` (480) choose the
+    picture.
 
     `info` holds tracking_error [m], electrical_power [W], electrical_energy, drawn_energy and link_work [J] since the
     reset, reward_tracking, reward_energy, voltage [V], elbow_force [N] and below_table [s].
 
     A table adds contact_force [N] (joints 3 to n and the hand; radial, tangential, normal), load_bearing and
-    contact_loss [J]; heat adds temperature_rise [K] and overheated; a supply's resistance adds supply_loss [J]. A
-    reset tells what it drew under `parameters` and `circle`.
+    contact_loss [J]; heat adds temperature_rise [K] and overheated; a supply's resistance adds supply_loss [J].
+    After a reset `parameters` and `circle` have what was drawn.
 
     ## Version History
 
@@ -148,12 +148,12 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     @property
     def settings(self) -> Settings:
-        """The arguments that the environment was made with."""
+        """Arguments that the environment was made with."""
         return self._episodes.settings
 
     @property
     def episodes(self) -> Episodes:
-        """The batch of one arm that this environment runs."""
+        """Batch with the one arm of this environment."""
         return self._episodes
 
     @property
@@ -162,21 +162,21 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return self._episodes.layout.names
 
     def decode(self, observation: NDArray[np.float32]) -> dict[str, Array]:
-        """The observation's quantities in SI units, by feature name."""
+        """Quantities of the observation in SI units, by feature name, each (size,)."""
         return self._episodes.layout.decode(observation)
 
     def set_energy_weight(self, energy_weight: float) -> None:
-        """Changes the reward's price of power [1/W] from the next step on."""
+        """Changes the cost per watt of electrical power [1/W] from the next step on."""
         self._episodes.energy_weight = non_negative("energy_weight", energy_weight)
 
     def set_tracking_weight(self, tracking_weight: float) -> None:
-        """Changes the reward's price of tracking error [1/m] from the next step on."""
+        """Changes the cost per metre of tracking error [1/m] from the next step on."""
         self._episodes.tracking_weight = non_negative("tracking_weight", tracking_weight)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Starts an episode. Raises ValueError naming a wrong option, with everything as it was."""
+        """Starts an episode. Raises ValueError naming a wrong option, with everything as it was before."""
         before = self._np_random, self._np_random_seed
         super().reset(seed=seed)
         try:
@@ -214,15 +214,15 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return None if pictures is None else pictures[0]
 
     def close(self) -> None:
-        """Takes the window away, if there is one. May be called twice."""
+        """Closes the window, if there is one. May be called twice."""
         self._viewer.close()
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that runs on, the random generator included."""
+        """Everything that changes from step to step, the random generator included."""
         return {"episodes": self._episodes.get_state(), "generator": copy.deepcopy(self.np_random.bit_generator.state)}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Takes a state of `get_state`; the continued run is bit-identical."""
+        """Restores a state of `get_state`; the run goes on bit for bit."""
         require_entries(state, ("episodes", "generator"), "state")
         self._episodes.set_state(state["episodes"], [self.np_random])
         self.np_random.bit_generator.state = state["generator"]

@@ -1,4 +1,4 @@
-"""Where the arm is: joint and hand positions, the elbows' height, radius and Jacobians, inverse kinematics.
+"""Positions of joints and hand, heights, radii and Jacobians of elbows, and inverse kinematics.
 
 Angles: `q` is relative; the pitch phi_k = q_2 + ... + q_k is measured from the vertical. Link k runs
 l_k sin(phi_k) outward along the radius that the yaw q_1 selects and l_k cos(phi_k) up.

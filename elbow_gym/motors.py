@@ -87,7 +87,7 @@ def terminal_voltage(
     supply_resistance: float,
     regeneration: bool = True,
 ) -> Array:
-    """What a supply with an internal resistance leaves at the motor terminals [V], shape (n,).
+    """Voltages at the motor terminals under a supply with an internal resistance [V], shape (n,).
 
     v = command (1 - R_s I / V0), I of `bus_current`: the drives keep their duty while the bus sags to V0 - R_s I. The
     supply itself loses R_s I^2 [W], so that V0 I = sum v i + R_s I^2 with regeneration.

@@ -1,4 +1,4 @@
-"""MOElbowArmEnv: the same arm with a vector reward, by MO-Gymnasium's conventions."""
+"""Environment of one arm with a vector reward, by MO-Gymnasium's conventions."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ WEIGHTS = ("tracking_weight", "energy_weight")
 class MOElbowArmEnv(ElbowArmEnv):
     """`ElbowArmEnv` whose reward is `[-|hand - target|, -P]` in m and W, shape (2,), without weights.
 
-    MO-Gymnasium's `LinearReward` with the weights of an `ElbowArmEnv` gives back exactly its reward. Takes its
-    arguments but the weights. `reward_space` and `reward_dim` are MO-Gymnasium's.
+    MO-Gymnasium's `LinearReward` with the weights of an `ElbowArmEnv` gives back exactly its reward. The arguments
+    are those of `ElbowArmEnv` but the weights. `reward_space` and `reward_dim` are MO-Gymnasium's.
     """
 
     def __init__(self, **arguments: Any) -> None:

@@ -1,4 +1,4 @@
-"""What the arm is made of: motors, links and the serial chain of them."""
+"""Parameters of motors, links and arms, validated when they are made."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ class MotorParameters:
     """A DC servo motor behind a gear (eqs 1-12). All positive; frictions and temperature_coefficient also zero."""
 
     armature_resistance: float = 1.1
-    """R [ohm]."""
+    """Armature resistance R [ohm]."""
     armature_inductance: float = 0.0017
-    """L [H]."""
+    """Armature inductance L [H]."""
     torque_constant: float = 0.203
-    """K [N m/A], equal to the back-EMF constant [V s/rad]."""
+    """Torque constant K [N m/A], equal to the back-EMF constant [V s/rad]."""
     rotor_inertia: float = 0.000164
-    """I_m [kg m^2], at the motor shaft."""
+    """Inertia I_m of the rotor, at the motor shaft [kg m^2]."""
     gear_ratio: float = 3.0
-    """k [-], motor turns per joint turn."""
+    """Gear ratio k, turns of the motor per turn of the joint [-]."""
     gear_viscous_friction: float = 0.01
-    """d_m [N m s/rad], at the motor shaft."""
+    """Viscous friction d_m of the gear, at the motor shaft [N m s/rad]."""
     gear_coulomb_friction: float = 0.0
-    """T_c [N m], at the motor shaft."""
+    """Coulomb friction T_c of the gear, at the motor shaft [N m]."""
     thermal_resistance: float = 5.0
-    """R_th [K/W], from the winding to the ambient."""
+    """Thermal resistance R_th from the winding to the ambient [K/W]."""
     heat_capacity: float = 20.0
-    """C_th [J/K], of the winding."""
+    """Heat capacity C_th of the winding [J/K]."""
     temperature_coefficient: float = 0.00393
-    """alpha [1/K] of the armature resistance; copper's."""
+    """Temperature coefficient alpha of the armature resistance [1/K]; copper's by default."""
     temperature_limit: float = 100.0
-    """Rise of the winding above the ambient [K] that it is rated for."""
+    """Temperature above the ambient that the winding is rated for [K]."""
 
     def __post_init__(self) -> None:
         may_be_zero = {"gear_viscous_friction", "gear_coulomb_friction", "temperature_coefficient"}
@@ -58,32 +58,32 @@ class MotorParameters:
 
     @property
     def joint_torque_constant(self) -> float:
-        """K_m = K k [N m/A at the joint].   Eqs 9-12."""
+        """Torque constant K_m = K k at the joint [N m/A].   Eqs 9-12."""
         return self.torque_constant * self.gear_ratio
 
     @property
     def reflected_inertia(self) -> float:
-        """J_m = I_m k^2 [kg m^2 at the joint].   Eq. 12."""
+        """Inertia of the rotor J_m = I_m k^2 at the joint [kg m^2].   Eq. 12."""
         return self.rotor_inertia * self.gear_ratio**2
 
     @property
     def reflected_viscous_friction(self) -> float:
-        """D_m = d_m k^2 [N m s/rad at the joint].   Eq. 12."""
+        """Viscous friction of the gear D_m = d_m k^2 at the joint [N m s/rad].   Eq. 12."""
         return self.gear_viscous_friction * self.gear_ratio**2
 
     @property
     def reflected_coulomb_friction(self) -> float:
-        """T_c k [N m at the joint]."""
+        """Coulomb friction of the gear T_c k at the joint [N m]."""
         return self.gear_coulomb_friction * self.gear_ratio
 
 
 def cylinder_axial_inertia(mass: Any, radius: Any) -> Any:
-    """I_s = m r^2 / 2 [kg m^2], about a solid cylinder's axis; numbers or arrays."""
+    """Inertia I_s = m r^2 / 2 of a solid cylinder about its axis [kg m^2]; numbers or arrays."""
     return mass * radius**2 / 2.0
 
 
 def cylinder_transverse_inertia(mass: Any, radius: Any, length: Any) -> Any:
-    """I_t = m (3 r^2 + l^2) / 12 [kg m^2], across the axis at the centre of mass; numbers or arrays."""
+    """Inertia I_t = m (3 r^2 + l^2) / 12 of a solid cylinder across its axis [kg m^2]; numbers or arrays."""
     return mass * (3.0 * radius**2 + length**2) / 12.0
 
 
@@ -92,11 +92,11 @@ class LinkParameters:
     """A uniform solid cylinder, its centre of mass in the middle."""
 
     mass: float = 0.1
-    """m [kg]."""
+    """Mass m [kg]."""
     length: float = 0.3
-    """l [m]; zero for link 1, which only carries the yaw."""
+    """Length l [m]; zero for link 1, which only carries the yaw."""
     radius: float = 0.01
-    """r [m]."""
+    """Radius r [m]."""
 
     def __post_init__(self) -> None:
         _set(self, "mass", positive("mass", self.mass))
@@ -105,12 +105,12 @@ class LinkParameters:
 
     @property
     def axial_inertia(self) -> float:
-        """I_s [kg m^2], about the cylinder's axis."""
+        """Inertia I_s about the cylinder's axis [kg m^2]."""
         return cylinder_axial_inertia(self.mass, self.radius)
 
     @property
     def transverse_inertia(self) -> float:
-        """I_t [kg m^2], across the axis at the centre of mass."""
+        """Inertia I_t across the cylinder's axis at the centre of mass [kg m^2]."""
         return cylinder_transverse_inertia(self.mass, self.radius, self.length)
 
 
@@ -122,15 +122,15 @@ class ArmParameters:
     """
 
     links: tuple[LinkParameters, ...]
-    """Link k runs from joint k to joint k + 1 (the last one to the hand)."""
+    """Links; link k runs from joint k to joint k + 1, the last one to the hand."""
     motors: tuple[MotorParameters, ...]
-    """One motor per joint."""
+    """Motors, one per joint."""
     joint_viscous_friction: tuple[float, ...]
-    """D [N m s/rad], one per joint."""
+    """Viscous friction D of each joint [N m s/rad]."""
     nominal_pose: tuple[float, ...]
-    """Joint angles [rad] of the start pose, which the PD also keeps on its idle joints."""
+    """Joint angles of the start pose [rad], which the PD also keeps on its idle joints."""
     gravity: float = 9.81
-    """g [m/s^2], along -z."""
+    """Gravity g along -z [m/s^2]."""
 
     def __post_init__(self) -> None:
         n = len(self.links)
@@ -163,22 +163,22 @@ class ArmParameters:
         return len(self.links)
 
     def of_links(self, name: str) -> Array:
-        """A link quantity by its attribute name, shape (n,)."""
+        """Quantity of all links by its attribute name, shape (n,)."""
         return np.array([getattr(link, name) for link in self.links])
 
     def of_motors(self, name: str) -> Array:
-        """A motor quantity by its attribute name, shape (n,)."""
+        """Quantity of all motors by its attribute name, shape (n,)."""
         return np.array([getattr(motor, name) for motor in self.motors])
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain JSON types, the inverse of `from_dict`."""
+        """Parameters as plain JSON types, the inverse of `from_dict`."""
         plain = asdict(self)
         plain.update({key: list(value) for key, value in plain.items() if key != "gravity"})
         return plain
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> ArmParameters:
-        """The arm of `to_dict`. Raises ValueError naming an unknown, missing or wrong entry."""
+        """Arm from a dict of `to_dict`. Raises ValueError naming an unknown, missing or wrong entry."""
         allowed = {field.name for field in fields(cls)}
         check_entries(plain, allowed, "arm")
         require_entries(plain, sorted(allowed - {"gravity"}), "arm")

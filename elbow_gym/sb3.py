@@ -1,4 +1,4 @@
-"""SB3VecEnv: the batched environment as Stable-Baselines3 wants it. The only module that needs that library."""
+"""Adapter of the batched environment to Stable-Baselines3. No other module of the package needs that library."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class SB3VecEnv(VecEnv):
         self.metadata = env.metadata
 
     def reset(self) -> NDArray[np.float32]:
-        """Starts all episodes, with the seeds and options set before, once."""
+        """Starts all episodes, once with the seeds and options that were set before."""
         seeds = None if all(seed is None for seed in self._seeds) else list(self._seeds)
         given = [options for options in self._options if options]
         if given and any(options != given[0] for options in self._options):
@@ -67,7 +67,7 @@ class SB3VecEnv(VecEnv):
         self.env.close()
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
-        """The batched environment's attribute, once per arm asked for."""
+        """Attribute of the batched environment, once per arm asked for."""
         return [getattr(self.env, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
@@ -82,5 +82,5 @@ class SB3VecEnv(VecEnv):
         return [answer] * len(list(self._get_indices(indices)))
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:
-        """No arm has a wrapper of its own."""
+        """False for each arm asked for: the arms have no wrappers."""
         return [False] * len(list(self._get_indices(indices)))

@@ -1,4 +1,4 @@
-"""The compliant table under the arm: what it is made of."""
+"""Parameters of the compliant table under the arm."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, cast
 from elbow_gym.checks import check_entries, non_negative, positive
 
 FRICTION_VELOCITY = 0.01
-"""Sliding speed [m/s] over which friction on the table comes up, unless a table says otherwise."""
+"""Default sliding speed over which friction on the table builds up [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,13 +20,13 @@ class TableParameters:
     """
 
     stiffness: float = 1e5
-    """k [N/m], at each touching point."""
+    """Stiffness k at each touching point [N/m]."""
     dissipation: float = 0.5
-    """c [s/m]: the normal force grows by this share per m/s of approach."""
+    """Dissipation c [s/m]: share by which the normal force grows per m/s of approach."""
     friction: float = 0.0
-    """mu [-], Coulomb's coefficient."""
+    """Coulomb's coefficient mu [-]."""
     friction_velocity: float = FRICTION_VELOCITY
-    """v_s [m/s]: friction has 0.71 of its full size at this sliding speed."""
+    """Sliding speed v_s at which friction has 0.71 of its full size [m/s]."""
 
     def __post_init__(self) -> None:
         for field in fields(self):

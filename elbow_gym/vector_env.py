@@ -1,4 +1,4 @@
-"""ElbowArmVectorEnv: B arms in one compiled call, as a Gymnasium vector environment."""
+"""Gymnasium vector environment of B arms in one compiled call."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
     Takes the arguments of `ElbowArmEnv` and
 
     Args:
-        num_envs: the number of arms.
+        num_envs: number B of arms.
         autoreset_mode: "NextStep", "SameStep" or "Disabled" (then reset with `options={"reset_mask": ...}`).
         num_threads: threads over which blocks of arms are spread; the results do not depend on it.
 
@@ -74,12 +74,12 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
 
     @property
     def settings(self) -> Settings:
-        """The arguments that the environment was made with."""
+        """Arguments that the environment was made with."""
         return self._episodes.settings
 
     @property
     def episodes(self) -> Episodes:
-        """The batch of arms that this environment runs."""
+        """Batch of the arms of this environment."""
         return self._episodes
 
     @property
@@ -91,26 +91,26 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
     def np_random(  # pyright: ignore[reportIncompatibleMethodOverride]
         self,
     ) -> tuple[np.random.Generator, ...]:
-        """One generator per arm."""
+        """Random generators, one per arm."""
         self._seed(None, np.ones(self.num_envs, dtype=np.bool_))
         return tuple(self._generators)
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """One seed per arm."""
+        """Seeds, one per arm."""
         self._seed(None, np.ones(self.num_envs, dtype=np.bool_))
         return tuple(self._seeds)
 
     def decode(self, observation: NDArray[np.float32]) -> dict[str, Array]:
-        """The observations' quantities in SI units, by feature name, each (B, size)."""
+        """Quantities of the observations in SI units, by feature name, each (B, size)."""
         return self._episodes.layout.decode(observation)
 
     def set_energy_weight(self, energy_weight: float) -> None:
-        """Changes the reward's price of power [1/W] from the next step on."""
+        """Changes the cost per watt of electrical power [1/W] from the next step on."""
         self._episodes.energy_weight = non_negative("energy_weight", energy_weight)
 
     def set_tracking_weight(self, tracking_weight: float) -> None:
-        """Changes the reward's price of tracking error [1/m] from the next step on."""
+        """Changes the cost per metre of tracking error [1/m] from the next step on."""
         self._episodes.tracking_weight = non_negative("tracking_weight", tracking_weight)
 
     def _seed(self, seed: int | Sequence[int | None] | None, chosen: Flags) -> None:
@@ -224,11 +224,11 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         return self._viewer.render(bool(self._started.all()))
 
     def close_extras(self, **_kwargs: Any) -> None:
-        """Takes the window away, if there is one."""
+        """Closes the window, if there is one."""
         self._viewer.close()
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that runs on, the random generators included."""
+        """Everything that changes from step to step, the random generators included."""
         return {
             "episodes": self._episodes.get_state(),
             "generators": [generator.bit_generator.state for generator in self.np_random],
@@ -237,7 +237,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Takes a state of `get_state`; the continued run is bit-identical."""
+        """Restores a state of `get_state`; the run goes on bit for bit."""
         require_entries(state, ("episodes", "generators", "over", "started"), "state")
         if len(state["generators"]) != self.num_envs:
             raise ValueError(f"state['generators'] must have {self.num_envs} entries, got {len(state['generators'])}")
@@ -255,12 +255,12 @@ def spread(mask: Flags, rows: Array) -> Flags:
 
 
 def drawn_only(info: Mapping[str, Any], flows: Mapping[str, Any]) -> dict[str, Any]:
-    """What a reset's info says beyond a step's: the values that were drawn."""
+    """Entries of a reset's info that a step's has not: the values that were drawn."""
     return {key: rows for key, rows in info.items() if key not in flows}
 
 
 def masked(info: Mapping[str, Any], mask: Flags) -> dict[str, Any]:
-    """Gymnasium's vector info: each key beside its `_key` mask of the arms that have it, dicts inside likewise."""
+    """Gymnasium's vector info: each key beside its `_key` mask of the arms that have it, and so in dicts inside."""
     full: dict[str, Any] = {
         key: masked(cast("dict[str, Any]", rows), mask) if isinstance(rows, dict) else rows
         for key, rows in info.items()

@@ -1,6 +1,6 @@
-"""A good engineer's controllers: smooth references, gravity feed-forward and computed torque, in volts.
+"""Classical controllers in volts: smooth references, gravity feed-forward and computed torque.
 
-All start from where the arm stands and blend over to the pose that has the hand on the target. They count the time
+All start from the arm's pose and blend over to the pose that has the hand on the target. They count the time
 since the start by their own calls: make one controller per episode, and let all arms of a batch start together.
 """
 
@@ -33,13 +33,13 @@ COMPUTED: dict[str, Any] = {
     "voltage_limit": 24.0,
     "action_unit": "volt",
 }
-"""Arguments of the environment that computed torque acts in; the PD variants act in the PD's."""
+"""Arguments of the environment for computed torque; those for the PD variants are the PD's."""
 REACH_TIME = 0.7
-"""From the start pose to the target [s]: with less, the yaw would want more than 24 V."""
+"""Time from the start pose to the target [s]; with less, the yaw would need more than 24 V."""
 BANDWIDTH = 15.0
-"""Both poles of computed torque's tracking error [rad/s]."""
+"""Magnitude of both poles of computed torque's tracking error [rad/s]."""
 ANGLE_STEP = 1e-4
-"""Half the difference by which the reference's rates become accelerations [rad of the circle]."""
+"""Half the step of the central difference that turns the reference's rates into accelerations [rad of the circle]."""
 
 
 class Motion(NamedTuple):
@@ -51,12 +51,12 @@ class Motion(NamedTuple):
 
 
 class Reference:
-    """Minimum-jerk blend from the pose seen first to the pose q_d of joints 1, n-1 and n on the target (eq. 29).
+    """Minimum-jerk blend from the first observed pose to the pose q_d with the hand on the target (eq. 29).
 
     Args:
         env: the environment that the arm acts in.
-        pose: what joints 2..n-2 end in [rad], (n,); the start pose when None.
-        reach_time: from the start to the target [s].
+        pose: angles that joints 2..n-2 end in [rad], (n,); the start pose when None.
+        reach_time: time from the start to the target [s].
     """
 
     def __init__(self, env: Env, pose: ArrayLike | None, reach_time: float) -> None:
@@ -79,7 +79,7 @@ class Reference:
         return q[0], q_dot[0], q_dot[1] - q_dot[2]
 
     def next(self, angle: Array, q: Array) -> Motion:
-        """The motion now, at the target's angle on the circle [rad], (...), with the arm at q [rad], (..., n)."""
+        """Motion at this control period, for the target's angle on the circle [rad], (...), and q [rad], (..., n)."""
         if self._start is None:
             self._start = q
         rate = np.asarray(self._circle.rate)[..., None]
@@ -97,7 +97,7 @@ class Reference:
 
 
 class _Following(ABC):
-    """What the controllers below share: they see the state, follow a reference and give clipped actions."""
+    """Base of the controllers, which observe the state, follow a reference and give clipped actions."""
 
     def __init__(self, env: Env, pose: ArrayLike | None = None, reach_time: float = REACH_TIME) -> None:
         episodes = env.unwrapped.episodes
@@ -126,8 +126,8 @@ class SmoothPD(_Following):
 
     Args:
         env: the environment that it will act in, at the PD's control frequency.
-        pose: what joints 2..n-2 end in [rad], (n,); the start pose when None.
-        reach_time: from the start to the target [s].
+        pose: angles that joints 2..n-2 end in [rad], (n,); the start pose when None.
+        reach_time: time from the start to the target [s].
     """
 
     def _voltage(self, wanted: Motion, q: Array, q_dot: Array, current: Array) -> Array:
@@ -154,8 +154,8 @@ class ComputedTorque(_Following):
 
     Args:
         env: the environment that it will act in; `COMPUTED` has its arguments.
-        pose: what joints 2..n-2 end in [rad], (n,); the start pose when None.
-        reach_time: from the start to the target [s].
+        pose: angles that joints 2..n-2 end in [rad], (n,); the start pose when None.
+        reach_time: time from the start to the target [s].
     """
 
     def _voltage(self, wanted: Motion, q: Array, q_dot: Array, current: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Which torques, currents and voltages a motion needs: the equations of motion read backwards, for whole batches.
+"""Torques, currents and voltages that a motion needs: the equations of motion solved for them, for whole batches.
 
 Lagrange's equations in absolute pitch, where the mass matrix of the plane is S_ab cos(phi_a - phi_b): a third
 derivation beside the paper's Newton-Euler pass and the kernel's recursion. They are written in products alone, so that
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class Drive(NamedTuple):
-    """What the motors and the table must give for a motion."""
+    """Currents of the motors and forces of the table that a motion needs."""
 
     current: Array
     """Armature currents [A], (..., n)."""
@@ -96,7 +96,7 @@ class InverseDynamics:
         return -(np.sin(q @ self.to_pitch) * (q_dot @ self.to_pitch)) @ self._below
 
     def elbow_torque(self, q: Any, elbow_force: Any) -> Any:
-        """J_c^T f [N m], (..., n): what forces [N], (..., p), on the elbows turn the joints by.   Eq. 17."""
+        """J_c^T f [N m], (..., n): joint torques of forces on the elbows [N], (..., p).   Eq. 17."""
         return -(np.sin(q @ self.to_pitch) * (elbow_force @ self._below.T)) @ self.to_pitch.T
 
     def held_acceleration(self, q: Array, q_dot: Array, q_ddot: Array) -> Array:

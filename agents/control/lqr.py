@@ -1,4 +1,4 @@
-"""Time-varying LQR around a trajectory: the voltages that were planned, plus what the deviation asks for."""
+"""Time-varying LQR around a trajectory: planned voltages plus feedback of the deviation."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from elbow_gym.vector_env import ElbowArmVectorEnv
 Array = NDArray[np.float64]
 
 STEP = 1e-5
-"""Half the difference of the central differences [rad, rad/s, A, V]."""
+"""Half the step of the central differences [rad, rad/s, A, V]."""
 SMOOTHING = 0.002
-"""The tracking error e is priced as sqrt(e^2 + SMOOTHING^2) [m]: its curvature is finite on the target."""
+"""Length that smooths the tracking error e to sqrt(e^2 + SMOOTHING^2) [m], whose curvature is finite on the target."""
 STIFFNESS = 1e-3
-"""Price of a joint's deviation from the trajectory [1/rad^2], which the hand alone would leave free."""
+"""Cost of a joint's deviation from the trajectory [1/rad^2], which the hand alone would leave free."""
 
 
 class TimeVaryingLQR:
@@ -33,7 +33,7 @@ class TimeVaryingLQR:
 
     Args:
         env: the environment that it will act in, at the trajectory's control frequency.
-        trajectory: what it follows.
+        trajectory: trajectory to follow.
 
     Raises:
         ValueError: the trajectory has not one voltage for each of the environment's control periods.
@@ -63,7 +63,7 @@ class TimeVaryingLQR:
         return np.clip(voltage / self._volts, -self._highest, self._highest).astype(np.float32), None
 
     def restart(self) -> None:
-        """The next call of `predict` is an episode's start again."""
+        """Starts an episode: the next call of `predict` is its first."""
         self._period = 0
 
 
@@ -122,7 +122,7 @@ def lqr_gains(settings: Settings, trajectory: Trajectory) -> Array:
 
 
 def _tracking_curvature(settings: Settings, q: Array, target: Array) -> Array:
-    """Second derivative of the tracking price in the state, (3n, 3n), without the hand path's own curvature."""
+    """Second derivative of the tracking cost in the state, (3n, 3n), without the curvature of the hand's path."""
     arm, n = settings.parsed_arm, settings.parsed_arm.n_joints
     nudge = np.concatenate([np.eye(n), -np.eye(n)]) * STEP
     hand = hand_position(arm, q + nudge)

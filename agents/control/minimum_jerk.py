@@ -1,4 +1,4 @@
-"""Smooth motion from where the arm stands to where it should be: the minimum-jerk blend."""
+"""Minimum-jerk blend from one pose to another."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the redundant joints should stand: the posture that holds the arm over the circle with least copper loss."""
+"""Posture of the redundant joints that holds the arm over the circle with least copper loss."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NUDGE = 2.0**-26
 
 @dataclass(frozen=True)
 class Posture:
-    """A pose of the idle joints and what holding the arm in it costs."""
+    """Pose of the idle joints, and the copper loss of holding the arm in it."""
 
     pose: Array
     """Joint angles [rad], (n,); joints 1, n-1 and n are those for the circle's first point."""
@@ -65,7 +65,7 @@ def best_postures(
         circle: the hand's path.
         above_table: whether every joint and the hand must have z >= 0.
         starts: searches, one from the arm's nominal pose and the others from normal noise about it.
-        seed: of the noise.
+        seed: seed of the noise.
 
     Raises:
         ValueError: no search found a posture that meets its conditions.

@@ -1,4 +1,4 @@
-"""A state trajectory on the control grid: what an optimisation leaves behind and what controllers follow."""
+"""State trajectory at the control periods, as an optimisation writes it and controllers follow it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Trajectory:
     q: Array
     """Relative joint angles [rad], (N + 1, n)."""
     q_dot: Array
-    """[rad/s], (N + 1, n)."""
+    """Rates of the joint angles [rad/s], (N + 1, n)."""
     current: Array
     """Armature currents [A], (N + 1, n)."""
     voltage: Array
@@ -42,7 +42,7 @@ class Trajectory:
 
 
 class OpenLoop:
-    """Plays the voltages of a trajectory, whatever happens.
+    """Controller that plays the voltages of a trajectory open loop.
 
     Args:
         env: the environment that it will act in, at the trajectory's control frequency.
@@ -59,7 +59,7 @@ class OpenLoop:
     def predict(
         self, observation: NDArray[np.float32], *_args: Any, **_kwargs: Any
     ) -> tuple[NDArray[np.float32], None]:
-        """The next period's actions (..., n) for observations (..., size); the first call is the episode's start."""
+        """Actions of the next control period (..., n) for observations (..., size); the first starts an episode."""
         action = self._actions[self._steps].astype(np.float32)
         self._steps += 1
         return np.broadcast_to(action, (*observation.shape[:-1], action.size)).copy(), None

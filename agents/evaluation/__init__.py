@@ -1,1 +1,1 @@
-"""Plays controllers and says what it cost."""
+"""Players, recordings of their episodes, and metrics."""

@@ -1,4 +1,4 @@
-"""What a recorded run cost and how well it tracked: one definition for every table."""
+"""Metrics of recorded runs, defined once for every table: energies, errors, forces, return."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ RETURN_PERIOD = 0.02
 
 @dataclass(frozen=True)
 class Regime:
-    """Where a run starts and from when on it counts."""
+    """Start of a run and the part of it that counts."""
 
     name: str
     start: str
     """The environment's `start`."""
     since: float
-    """Counted from here to the end [s]."""
+    """Time from which the run counts, to its end [s]."""
     meaning: str
 
 

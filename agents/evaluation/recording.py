@@ -1,4 +1,4 @@
-"""Plays a controller through the environment and keeps what happened."""
+"""Recordings of whole episodes of a controller in the batched environment."""
 
 from __future__ import annotations
 
@@ -24,31 +24,31 @@ class Recording:
     settings: Settings
     seeds: tuple[int, ...]
     time: Array
-    """[s], (T + 1,)."""
+    """Time since the start [s], (T + 1,)."""
     q: Array
     """Relative joint angles [rad], (T + 1, B, n)."""
     q_dot: Array
-    """[rad/s], (T + 1, B, n)."""
+    """Rates of the joint angles [rad/s], (T + 1, B, n)."""
     hand: Array
-    """[m], (T + 1, B, 3)."""
+    """Position of the hand [m], (T + 1, B, 3)."""
     target: Array
-    """[m], (T + 1, B, 3)."""
+    """Position of the target [m], (T + 1, B, 3)."""
     electrical_energy: Array
-    """Signed, since the start, per joint [J], (T + 1, B, n)."""
+    """Signed electrical energy of each joint since the start [J], (T + 1, B, n)."""
     drawn_energy: Array
-    """Positive power alone [J], (T + 1, B, n)."""
+    """Integral of the positive electrical power of each joint since the start [J], (T + 1, B, n)."""
     copper_loss: Array
-    """[J], (T + 1, B, n)."""
+    """Heat in each winding since the start [J], (T + 1, B, n)."""
     link_work: Array
-    """[J], (T + 1, B, n)."""
+    """Work of each motor on the links since the start [J], (T + 1, B, n)."""
     elbow_force: Array
-    """[N], (T + 1, B, p); negative where the table pulls."""
+    """Force of the table on each elbow along +z [N], (T + 1, B, p); negative where it pulls."""
     below_table: Array
     """Time under the table since the start [s], (T + 1, B)."""
     voltage: Array
-    """The largest in size since the instant before (zero at the first) [V], (T + 1, B, n)."""
+    """Terminal voltage of largest magnitude since the instant before, zero at the first [V], (T + 1, B, n)."""
     current: Array
-    """[A], (T + 1, B, n)."""
+    """Armature currents [A], (T + 1, B, n)."""
 
 
 def record(
@@ -183,7 +183,7 @@ def _side_by_side(states: Sequence[Any]) -> Any:
 
 
 def thinned(run: Recording, period: float) -> Recording:
-    """The recording at every `period` seconds alone."""
+    """Recording with one instant for every `period` seconds."""
     stride = max(1, round(period / run.time[1]))
     names = [field.name for field in fields(run) if isinstance(getattr(run, field.name), np.ndarray)]
     return replace(run, **{name: getattr(run, name)[::stride].copy() for name in names})

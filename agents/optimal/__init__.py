@@ -1,1 +1,1 @@
-"""The bound, by optimal control."""
+"""Bound on the return, by optimal control."""

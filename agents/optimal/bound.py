@@ -1,7 +1,7 @@
-"""The bound: the best return that direct transcription finds for an environment, proved by playing it back.
+"""Bound on the return: the best one that direct transcription finds for an environment, played in the simulator.
 
-From several postures a solution with two Radau points a period; the best of them is solved again with three. What
-counts is what the simulator makes of it: the planned voltages open loop, and under the time-varying LQR.
+Each of several postures gives a solution with two Radau points a period; the best is solved again with three. The cost
+that counts is the simulator's: of the planned voltages open loop, and of the plan under the time-varying LQR.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from elbow_gym.vector_env import ElbowArmVectorEnv
 Array = NDArray[np.float64]
 
 SMOOTHINGS = (0.03, 0.003, 0.001)
-"""The tracking error is smoothed over these lengths [m], one after the other."""
+"""Lengths over which the tracking error is smoothed, one after the other [m]."""
 ROUGH_SMOOTHINGS = (0.3, 0.03)
 ROUGH_ITERATIONS = 60
-"""The same with one point in a period, and the most iterations spent on it."""
+"""Most iterations with one point in a period, whose smoothings are ROUGH_SMOOTHINGS [m]."""
 ITERATIONS = 250
-"""The most iterations at one smoothing."""
+"""Most iterations at one smoothing."""
 REACH_TIME = 1.0
-"""A guess goes from the start to its posture in this time [s]."""
+"""Time of a guess from the start to its posture [s]."""
 COARSE, FINE = 2, 3
-"""Radau points in a control period: to search with, and to refine to."""
+"""Numbers of Radau points in a control period, in the search and in the refinement."""
 REFINEMENT = 0.005
-"""The cost may change by this fraction from COARSE to FINE."""
+"""Largest change of the cost from COARSE to FINE, as a share of it [-]."""
 REPLAY = 0.02
-"""The simulator's cost under the LQR may differ from the predicted one by this fraction."""
+"""Largest difference of the simulator's cost under the LQR from the predicted one, as a share of it [-]."""
 # A point where nothing moves any more is as good as a KKT point to eight digits: the cost is flat in the posture.
 ACCEPTABLE = {
     "acceptable_tol": 1e-2,
@@ -70,14 +70,14 @@ class Solution:
 
 @dataclass(frozen=True)
 class Optimum:
-    """The best solution and what the simulator makes of it without noise."""
+    """Best solution, and its costs in the simulator without noise."""
 
     trajectory: Trajectory
-    """The simulator's own states under the LQR and the voltages it applied: played open loop they repeat it."""
+    """States of the simulator under the LQR, and the voltages of the LQR, which repeat them open loop."""
     predicted_cost: float
-    """Negative return that the program promises."""
+    """Negative return of the solution on the fine mesh."""
     coarse_cost: float
-    """The same with `COARSE` points in a period."""
+    """Negative return of the solution with `COARSE` points in a period."""
     planned_open_loop: float
     """Negative return of the planned voltages, open loop."""
     closed_loop: float
@@ -87,17 +87,19 @@ class Optimum:
     energy: float
     """Electrical energy of `trajectory` [J]."""
     energy_tracking: float
-    """The same from 2 s on [J]."""
+    """Electrical energy of `trajectory` from 2 s on [J]."""
     error_rms: float
-    """Tracking error from 2 s on [mm]."""
+    """Root mean square of the tracking error from 2 s on [mm]."""
     error_mean: float
-    """Mean tracking error over the episode's control steps [m]."""
+    """Mean tracking error at the ends of the control periods [m]."""
     guess: str
+    """Name of the guess that led to the solution."""
     seconds: float
+    """Duration of the solve [s]."""
 
     @property
     def figures(self) -> dict[str, Any]:
-        """All but the trajectory, JSON types only."""
+        """All fields but the trajectory, JSON types only."""
         return {name: value for name, value in asdict(self).items() if name != "trajectory"}
 
 
@@ -120,7 +122,7 @@ def posture_guesses(problem: Problem) -> dict[str, Trajectory]:
 
 
 def variables(program: Transcription, trajectory: Trajectory) -> Array:
-    """A program's variables on a trajectory: cubic between its states, currents by inverse dynamics."""
+    """Variables of a program on a trajectory: cubic between its states, currents by inverse dynamics."""
     h, s = program.period, program.fractions[None, :, None]
     q0, q1 = trajectory.q[:-1, None], trajectory.q[1:, None]
     w0, w1 = trajectory.q_dot[:-1, None] * h, trajectory.q_dot[1:, None] * h
@@ -169,7 +171,7 @@ def solve(
 
 
 def simulated(problem: Problem, trajectory: Trajectory) -> tuple[Trajectory, Recording]:
-    """What the simulator makes of a trajectory under the LQR, without noise: states and voltages as they were."""
+    """States and voltages of the simulator under the LQR around a trajectory, without noise, and the recording."""
     _, recording = rollout(problem.settings, lambda env: TimeVaryingLQR(env, trajectory))
     states = (recording.q[:, 0], recording.q_dot[:, 0], recording.current[:, 0])
     return Trajectory(*states, recording.voltage[1:, 0]), recording
@@ -235,9 +237,9 @@ def optimum(
     """Solves a problem from several guesses, refines the best and plays it in the simulator.
 
     Args:
-        problem: what is minimised.
-        guesses: where to start from, by name.
-        progress: told of every solve.
+        problem: problem to solve.
+        guesses: motions to start from, by name.
+        progress: called with a line on every solve.
         refine: whether the mesh is refined; if not, the simulator's verdict alone is the check.
 
     Raises:

@@ -1,7 +1,7 @@
-"""The environment's episode as a sparse nonlinear program: Radau collocation of arm, motors and elbows.
+"""Episode of the environment as a sparse nonlinear program: Radau collocation of arm, motors and elbows.
 
 One control period under held voltages is one element with `degree` Radau points, which are stiffly accurate: the
-armature (1.5 ms) and the light links (5 ms) are faster than the period (20 ms). The motion equations stand as
+armature (1.5 ms) and the light links (5 ms) are faster than the period (20 ms). The motion equations are
 inverse-dynamics residuals, so that no linear solve enters an expression; the elbows' velocities are held at zero (held
 heights, of index 3, have multipliers that swing between the points). Every point's derivatives are one small CasADi
 function mapped over all points, the rest is constant.
@@ -23,13 +23,13 @@ from elbow_gym.task.settings import Settings
 Array = NDArray[np.float64]
 
 SETTLING_TIME = 0.05
-"""What discretisation leaves of an elbow's height decays with this time [s]."""
+"""Time constant with which an elbow's height left by the discretisation decays [s]."""
 NAMES = ("q", "q_dot", "q_ddot", "current", "elbow_force")
 
 
 @dataclass(frozen=True)
 class Problem:
-    """What is minimised: the negative return of one episode of an environment from its start without noise."""
+    """Problem of least negative return of one episode of an environment from its start without noise."""
 
     settings: Settings
     above_table: bool = False
@@ -89,10 +89,10 @@ class Points:
 
 
 class Transcription:
-    """The program and its solver. Variables: all points one after the other, then the voltages of all periods.
+    """Program and its solver. Variables: all points one after the other, then the voltages of all periods.
 
     Args:
-        problem: what is minimised.
+        problem: problem to solve.
         degree: Radau points in a control period.
     """
 
@@ -182,7 +182,7 @@ class Transcription:
         scale, multipliers = ca.MX.sym("f"), ca.MX.sym("g", count * points.conditions + rows.shape[0])
         smoothing, tracking, energy = parameters[0], parameters[1], parameters[2]
         Z = ca.reshape(x[: self._voltages], points.size, count)
-        # The reward looks at the last point of each period alone.
+        # The reward depends on the last point of each period alone.
         last = np.tile(np.arange(self.degree) == self.degree - 1, self.periods).astype(float)
         target = ca.DM(np.repeat(self.problem.target, self.degree, axis=0).T)
         seen = (Z, target, ca.repmat(smoothing, 1, count), ca.DM(last[None]) * tracking)
@@ -225,8 +225,8 @@ class Transcription:
         Args:
             guess: variables, (size,).
             smoothing: the tracking error e counts as sqrt(e^2 + smoothing^2) [m].
-            multipliers: what an earlier call returned.
-            options: IPOPT's, without the prefix.
+            multipliers: multipliers of an earlier call.
+            options: options of IPOPT, without the prefix.
 
         Returns:
             The variables, the multipliers and IPOPT's statistics.

@@ -1,1 +1,1 @@
-"""The paper reproduced, and its question asked on a table that cannot pull."""
+"""Reproduction of the paper's results, and the same comparison on a table that cannot pull."""

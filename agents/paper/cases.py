@@ -1,4 +1,4 @@
-"""Runs the paper's three cases and writes its figures, its numbers and a verdict on its claims."""
+"""Runs of the paper's three cases: figures, numbers and a verdict on its claims."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from elbow_gym.task.settings import Settings
 
 RESULTS = Path(__file__).parent / "results"
 RECORD_PERIOD = 2e-4
-"""At most, between the instants that the numbers are taken from [s]; keeping every period takes longer to run."""
+"""Longest time between the instants that the numbers are taken from [s]; keeping every period takes longer to run."""
 PICTURE_PERIOD = 0.002
-"""Between the points of the figures [s]."""
+"""Time between the points of the figures [s]."""
 # A figure takes about as long to draw as this many control periods to run, so that one bar's time left holds for both.
 FIGURE_PERIODS = 1500
 
@@ -54,16 +54,16 @@ EXPECTED: dict[str, tuple[Any, Any, Any]] = {
 }
 """Published reference for two, one and no elbow by field of `Numbers`: the PD continuous inside RK4 at 1e-4 s.
 
-Rounded as published. Ours holds each voltage for 1e-4 s, which makes joint 1's start 0.2 % dearer.
+Rounded as published. Here each voltage is held for 1e-4 s, which makes the start of joint 1 cost 0.2 % more.
 """
 
 UNITS = {"error_rms": "mm", "z_rms": "mm", "z_mean": "mm", "force_mean": "N", "force_smallest": "N", "below_table": "s"}
-"""Of the fields of `Numbers`; joules where none is given."""
+"""Units of the fields of `Numbers`; J where none is given."""
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What `reproduce` found and where it wrote it."""
+    """Results of `reproduce` and the files that it wrote."""
 
     numbers: dict[int, Numbers]
     claims: list[Claim]
@@ -72,7 +72,7 @@ class Reproduction:
 
 @dataclass(frozen=True)
 class Played:
-    """One run: what `measure` found and its series, every `PICTURE_PERIOD`."""
+    """One run: its numbers from `measure` and its series, every `PICTURE_PERIOD`."""
 
     values: dict[str, Any]
     series: Recording
@@ -119,7 +119,7 @@ def settings_of(elbows: int, name: str, **changes: Any) -> Settings:
 
 
 def play(settings: Settings, progress: Callable[[int], Any] | None = None) -> Played:
-    """One episode of the paper's PD, seed 0; `progress` is told the control periods done since it was last told."""
+    """One episode of the paper's PD, seed 0; `progress` gets the control periods done since its last call."""
     told = 0
 
     def tell(done: int, _horizon: int) -> None:
@@ -156,12 +156,12 @@ def measure(run: Recording) -> dict[str, Any]:
 
 
 def case_numbers(runs: Mapping[str, Mapping[str, Any]]) -> Numbers:
-    """One case from the figures of its `RUNS`."""
+    """Numbers of one case from those of its `RUNS`."""
     return Numbers(**runs["paper"], energy_on_target=runs["on target"]["energy"], energy_clipped=runs["24 V"]["energy"])
 
 
 def play_all(jobs: Mapping[Any, Settings], progress: Callable[[int], Any]) -> dict[Any, Played]:
-    """`play` for every job, each in a process of its own."""
+    """Results of `play` for every job, each in its own process."""
     return in_processes({key: Job(partial(play, jobs[key]), jobs[key].horizon) for key in jobs}, progress)
 
 
@@ -175,7 +175,7 @@ class Quantity(NamedTuple):
 
     @property
     def difference(self) -> float | None:
-        """Relative to the published value."""
+        """Difference from the published value, relative to it [-]."""
         if self.value is None or self.expected is None:
             return None
         return self.value / self.expected - 1.0

@@ -12,32 +12,32 @@ ALIKE = 1.25
 
 @dataclass(frozen=True, kw_only=True)
 class Numbers:
-    """What one elbow count cost and how well the hand tracked under the paper's PD."""
+    """Energies, errors and forces of one elbow count under the paper's PD."""
 
     elbow_joints: tuple[int, ...]
     """Joint numbers held on the table."""
     energy: float
     """Signed electrical energy of the whole run [J]."""
     joint_energy: tuple[float, ...]
-    """The same of each joint [J]."""
+    """Signed electrical energy of each joint in the whole run [J]."""
     joint_1_first_second: float
-    """The same of joint 1 in the run's first second [J]."""
+    """Signed electrical energy of joint 1 in the run's first second [J]."""
     energy_tracking: float
     """Signed electrical energy from t = 2 s on [J]."""
     link_work: float
-    """Of the whole run [J]."""
+    """Link work of the whole run [J]."""
     link_work_tracking: float
-    """From t = 2 s on [J]."""
+    """Link work from t = 2 s on [J]."""
     error_rms: float
-    """Hand error from t = 2 s on [mm]."""
+    """Root mean square of the hand's error from t = 2 s on [mm]."""
     z_rms: float
-    """Its vertical part [mm]."""
+    """Root mean square of the error's vertical part from t = 2 s on [mm]."""
     z_mean: float
     """Mean height of the hand over the target from t = 2 s on [mm]; negative where it sags."""
     energy_on_target: float
     """Signed electrical energy of the whole run when it starts on the target [J]."""
     energy_clipped: float
-    """The same from the paper's start with the voltage clipped to 24 V, at 2 kHz [J]."""
+    """Signed electrical energy of the whole run with the voltage clipped to 24 V, at 2 kHz [J]."""
     force_mean: tuple[float, ...]
     """Mean force of the table on each elbow from t = 2 s on [N]; negative where it pulls."""
     force_smallest: tuple[float, ...]
@@ -171,7 +171,7 @@ def _energy(cases: Cases) -> Claim:
 
 
 def disclosures(cases: Cases) -> list[str]:
-    """What a reader of the paper's conclusions should know beside them, from the same numbers."""
+    """Facts that qualify the paper's conclusions, from the same numbers."""
     notes = []
     for elbows in (2, 1):
         numbers = cases[elbows]

@@ -1,4 +1,4 @@
-"""The paper's figures 1 to 25, panel by panel, one overview of them, and the series that they draw."""
+"""Figures 1 to 25 of the paper, panel by panel, one overview of them, and the series that they draw."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ VIEWS = ((0, 1), (0, 2), (1, 2))
 # Where curves coincide the lower one still shows at the edges of the upper.
 WIDTHS = {2: 3.8, 1: 2.5, 0: 1.4}
 SERIES_PERIOD = 0.01
-"""Between rows of the series [s]."""
+"""Time between rows of the series [s]."""
 
 
 def figures(cases: Cases) -> Iterator[tuple[str, Any]]:
@@ -70,7 +70,7 @@ def energy_of(joint: int | None) -> Callable[[Recording], Array]:
 
 def _trajectories(cases: Cases, number: int, axes: tuple[int, int]) -> Any:
     first, second = axes
-    # Equal scales make the views along the table wide and low: there the panels stand on top of one another.
+    # Equal scales make the views along the table wide and low: there the panels lie one above the other.
     shape, size = {1: ((1, 3), (8.6, 5.8)), 2: ((3, 1), (5.6, 8.2)), 3: ((3, 1), (7.6, 6.9))}[number]
     fig, panels = pyplot().subplots(*shape, figsize=size, sharex=True, sharey=True, layout="constrained")
     for panel, elbows in zip(panels, CASES, strict=True):

@@ -38,43 +38,43 @@ class TableRecording(Recording):
     """A run on the compliant table; its arms are side by side, one per start."""
 
     normal_force: Array
-    """Of the table on joints 3..n and, last, the hand [N], (T + 1, B, n - 1); never negative."""
+    """Normal force of the table on joints 3..n and, last, the hand [N], (T + 1, B, n - 1); never negative."""
     contact_loss: Array
-    """Since the start, of all contacts [J], (T + 1, B)."""
+    """Heat in all contacts since the start [J], (T + 1, B)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TableNumbers:
-    """What one start under one friction cost under the paper's PD; forces are the table's, upward."""
+    """Energies, errors and upward forces of the table for one start and one friction, under the paper's PD."""
 
     energy: float
     """Signed electrical energy of the whole run [J]."""
     energy_tracking: float
-    """The same from t = 2 s on [J]."""
+    """Signed electrical energy from t = 2 s on [J]."""
     copper_loss_tracking: float
     """Heat in the windings from t = 2 s on [J]."""
     contact_loss: float
     """Heat in the contacts over the whole run [J]."""
     contact_loss_tracking: float
-    """The same from t = 2 s on [J]."""
+    """Heat in the contacts from t = 2 s on [J]."""
     error_rms: float
-    """Hand error from t = 2 s on [mm]."""
+    """Root mean square of the hand's error from t = 2 s on [mm]."""
     z_rms: float
-    """Its vertical part [mm]."""
+    """Root mean square of the error's vertical part from t = 2 s on [mm]."""
     force_4_mean: float
-    """On joint 4 from t = 2 s on [N]."""
+    """Mean force on joint 4 from t = 2 s on [N]."""
     force_4_smallest: float
-    """Likewise [N]."""
+    """Smallest force on joint 4 from t = 2 s on [N]."""
     force_4_largest: float
-    """Likewise [N]."""
+    """Largest force on joint 4 from t = 2 s on [N]."""
     force_7_mean: float
-    """On joint 7 from t = 2 s on [N]."""
+    """Mean force on joint 7 from t = 2 s on [N]."""
     force_7_smallest: float
-    """Likewise [N]."""
+    """Smallest force on joint 7 from t = 2 s on [N]."""
     force_7_largest: float
-    """Likewise [N]."""
+    """Largest force on joint 7 from t = 2 s on [N]."""
     force_elsewhere_largest: float
-    """On any other joint or the hand over the whole run [N]: what a swing at the start strikes."""
+    """Largest force on any other joint or the hand over the whole run [N], as the arm swings over at the start."""
 
 
 def start_pose(arm: ArmParameters, lift: tuple[float, float]) -> Array:
@@ -99,9 +99,9 @@ def play_on_table(
 
     Args:
         poses: start poses [rad], (n,) each, which the PD keeps on its idle joints.
-        friction: of the table [-].
+        friction: Coulomb's coefficient of the table [-].
         settings: circle, control frequency and duration; voltages are not limited.
-        progress: told the control periods done since it was last told.
+        progress: called with the control periods done since its last call.
 
     Raises:
         ArithmeticError: the simulation left what float64 can represent.
@@ -155,7 +155,7 @@ def _instant(simulator: Simulator) -> dict[str, Array]:
 
 
 def measure_on_table(run: TableRecording) -> list[TableNumbers]:
-    """The numbers of each of the run's arms."""
+    """Numbers of each arm of a run."""
     whole, late = metrics(run), metrics(run, SETTLED)
     settled = np.searchsorted(run.time, SETTLED - 1e-9)
     # The first contact is joint 3's.

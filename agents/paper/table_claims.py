@@ -1,4 +1,4 @@
-"""The paper's question asked again on the table of `tabletop`: numbers, verdict and command."""
+"""Verdict on whether leaning saves energy on a table that cannot pull, with the numbers and the command."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Cases = Mapping[float, Mapping[str, TableNumbers]]
 
 @dataclass(frozen=True)
 class TableReproduction:
-    """What `reproduce_on_table` found and where it wrote it."""
+    """Results of `reproduce_on_table` and the files that it wrote."""
 
     numbers: Cases
     claims: list[Claim]
@@ -96,7 +96,7 @@ def _listed(values: list[float], unit: str) -> str:
 
 
 def _loads(cases: Cases) -> Iterator[str]:
-    """What the table bears from each start, a value per friction."""
+    """Sentences on the forces that the table bears from each start, a value per friction."""
     for start in LIFTS:
         numbers = [starts[start] for starts in cases.values()]
         forces = {

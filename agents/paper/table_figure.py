@@ -1,4 +1,4 @@
-"""What leaning on a table that cannot pull costs and bears, in one picture."""
+"""Figure of the runs on a table that cannot pull: energy, error, hand and forces."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Runs = Mapping[float, TableRecording]
 COLOURS = dict(zip(LIFTS, ELBOW_COLOURS.values(), strict=True))
 NAMES = {"joints 4 and 7": "leaning on joints 4 and 7", "joint 4": "leaning on joint 4", "clear": "held clear"}
 PICTURE_PERIOD = 0.005
-"""Between the points of the curves [s]."""
+"""Time between the points of the curves [s]."""
 
 
 def table_figure(runs: Runs) -> Any:
-    """Above, energy and error by start and friction; below, the hand of the leaning arm and what the table bears."""
+    """Above, energy and error by start and friction; below, the hand of the leaning arm and the table's forces."""
     numbers = {friction: dict(zip(LIFTS, measure_on_table(run), strict=True)) for friction, run in runs.items()}
     fig, grid = pyplot().subplots(2, 3, figsize=(10.0, 6.4), layout="constrained")
     for panel, name, title in zip(

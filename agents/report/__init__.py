@@ -1,1 +1,1 @@
-"""One HTML file to look at: runs to replay, the paper's figures and the benchmark."""
+"""HTML page with replays of runs, the paper's figures and the benchmark."""

@@ -1,4 +1,4 @@
-"""The project's colours, made legible on a light and on a dark page."""
+"""Colours of the project, made legible on a light and on a dark page."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from agents.evaluation.players import TABLE
 from agents.style import CONTROLLER_COLOURS, ELBOW_COLOURS, TARGET_COLOUR
 
 BACKGROUNDS = {"light": "#ffffff", "dark": "#14181d"}
-"""Of the panels, as in page.css."""
+"""Colours of the panels, as in page.css."""
 TABLE_COLOUR = "#009E73"
-"""Of the table that cannot pull, beside the elbow counts' colours."""
+"""Colour of the table that cannot pull, beside those of the elbow counts."""
 CONTRAST = 3.0
-"""At least, of graphics against their background (WCAG 2.2, 1.4.11)."""
+"""Least contrast of graphics against their background (WCAG 2.2, 1.4.11)."""
 
 
 def luminance(colour: str) -> float:

@@ -1,4 +1,4 @@
-"""`python -m agents report`: plays every controller and writes the page."""
+"""Command `python -m agents report`, which plays every controller and writes the page."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from agents.report.page import page
 from agents.report.runs import collect
 
 RESULTS = Path(__file__).parents[2] / "benchmarks" / "results"
-"""What `python -m benchmarks` wrote; only read here."""
+"""Folder of the results of `python -m benchmarks`, which are only read here."""
 
 
 def report(output: Path, results: Path = RESULTS) -> Path:

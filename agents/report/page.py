@@ -1,4 +1,4 @@
-"""Puts the page together: markup, style, script and data in one file that loads nothing else."""
+"""Page in one file that loads nothing else: markup, style, script and data."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from agents.report.payload import payload
 from agents.report.runs import Run
 
 FOLDER = Path(__file__).parent / "web"
-"""The page's own markup, style and scripts."""
+"""Folder of the page's markup, style and scripts."""
 SCRIPTS = (
     "data",
     "state",
@@ -34,7 +34,7 @@ SCRIPTS = (
 )
 """ES modules in the order of their dependences; in the page they share one scope."""
 PACKAGES = ("elbow-gym", "numpy", "numba", "scipy", "gymnasium")
-"""Whose versions the figures depend on."""
+"""Packages whose versions the numbers depend on."""
 
 
 def page(runs: Sequence[Run], results: Path) -> str:

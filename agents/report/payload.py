@@ -1,4 +1,4 @@
-"""The data inside the page: every run's series as a compressed block, and what the plots need beside them."""
+"""Data inside the page: every run's series as a compressed block, and the data of the plots."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from agents.style import CONTROLLER_MARKERS, CONTROLLER_NAMES, ELBOW_NAMES
 from elbow_gym.kinematics import joint_positions
 
 BEARINGS = {**{str(elbows): ELBOW_NAMES[elbows] for elbows in CASES}, TABLE: "table that cannot pull"}
-"""What an arm leans on, as the page calls it."""
+"""Words of the page for what an arm leans on, by its key."""
 LENGTH_UNIT = 1e-4
-"""Of the joints' positions in the page [m]; the hand, which errors are taken from, has its own in full."""
+"""Unit of the joints' positions in the page [m]; the hand's, which errors are taken from, are in full."""
 
 
 def fields(run: Run) -> dict[str, NDArray[np.generic]]:
@@ -72,7 +72,7 @@ def packed(run: Run) -> dict[str, Any]:
 
 
 def _plain(value: float) -> float | None:
-    """JSON has no NaN."""
+    """Numbers as JSON has them: None where they are NaN."""
     return None if np.isnan(value) else float(f"{value:.6g}")
 
 
@@ -100,7 +100,7 @@ def payload(runs: Sequence[Run], results: Path) -> dict[str, Any]:
 
 
 def panels(series: Recording) -> list[dict[str, Any]]:
-    """The paper's figures in order: number, title, kind and what they draw."""
+    """Figures of the paper in order: number, title, kind and series."""
     drawn: list[dict[str, Any]] = []
     for number, (first, second) in enumerate(VIEWS, start=1):
         plane = f"{'xyz'[first]}-{'xyz'[second]}"
@@ -119,7 +119,7 @@ def panels(series: Recording) -> list[dict[str, Any]]:
 def front(path: Path) -> list[dict[str, Any]]:
     """Solved problems of the bound: elbows, start, energy weight, mean error [mm] and energy [J]; none without file.
 
-    What may go under the table is a question of its own and not a point of the front.
+    Problems in which the arm may go under the table are no points of the front.
     """
     if not path.is_file():
         return []

@@ -18,29 +18,29 @@ from agents.workers import Job, Tell, compile_before, counted, in_processes
 from elbow_gym.task.settings import STARTS
 
 PAPER_PD = ("pd_paper", "pd")
-"""Whose runs give the paper's numbers (`agents.paper.cases.RUNS`)."""
+"""Controllers whose runs give the paper's numbers (`agents.paper.cases.RUNS`)."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """One episode and what it cost."""
+    """One episode with its metrics."""
 
     controller: str
-    """As in the benchmark's tables."""
+    """Name of the controller, as in the benchmark's tables."""
     bearing: str
     """What the arm leans on: "2", "1" or "0" elbows, or `agents.evaluation.players.TABLE`."""
     start: str
-    """The environment's `start`."""
+    """Value of the environment's `start`."""
     series: Recording
-    """Every `SERIES_PERIOD`, or every control period where that is longer."""
+    """Recording at every `SERIES_PERIOD`, or every control period where that is longer."""
     figures: Mapping[str, Mapping[str, float]]
     """Metrics (`agents.evaluation.metrics.UNITS`) by regime, of the regimes with this start."""
     measured: Mapping[str, Any] | None = None
-    """What `agents.paper.cases.measure` found: of the paper's PD alone."""
+    """Numbers of `agents.paper.cases.measure`; None but for the paper's PD."""
 
     @property
     def key(self) -> str:
-        """Its name in the page."""
+        """Name of the run in the page."""
         return f"{self.controller}-{self.bearing}-{self.start}"
 
 

@@ -1,4 +1,4 @@
-"""The page's tables and sentences as HTML: they can be read without the script, which only sorts and filters them."""
+"""Tables and sentences of the page as HTML, readable without the script, which only sorts and filters them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Column(NamedTuple):
     """A column of the benchmark's table."""
 
     name: str
-    """In the CSV, without unit."""
+    """Name in the CSV, without unit."""
     title: str
     meaning: str
 
@@ -58,7 +58,7 @@ def paper_numbers(runs: Sequence[Run]) -> dict[int, Numbers]:
 
 
 def headline(numbers: Mapping[int, Numbers], runs: Sequence[Run]) -> str:
-    """What bracing and learning change, as tiles."""
+    """Tiles on what bracing and learning change."""
     tiles = [
         (
             f"PD, {ELBOW_NAMES[elbows]}",
@@ -111,7 +111,7 @@ def benchmark_table(results: Path, runs: Sequence[Run]) -> str:
     parts = {part: _rows(results / f"{file}.csv") for part, file in PARTS.items()}
     if not parts["nominal"]:
         return "<p>There are no results: <code>python -m benchmarks energy</code> makes them.</p>"
-    # "name [unit]"; beside it stand "name [unit] low" and "... high".
+    # "name [unit]"; beside it are "name [unit] low" and "... high".
     titled = [name[:-1].split(" [") for name in parts["nominal"][0] if name.endswith("]")]
     units = dict(titled)
     shown = [column for column in COLUMNS if column.name in units]

@@ -1,8 +1,8 @@
-"""What the repository carries of trainings and solved problems: policies, optimal motions and learning curves.
+"""Folders of the policies, optimal trajectories and learning curves that the repository carries.
 
 - `policies/`: ALGORITHM[_LABEL]_TASK_seedK.safetensors and .json, every training seed but the best of each algorithm
   and task, which is the baseline in `elbow_gym/baselines/policies`. `python -m agents publish` writes both.
-- `optima/`: the motions that `python -m benchmarks optimal` found, .npz and what made them, .json.
+- `optima/`: trajectories that `python -m benchmarks optimal` found, .npz, and how they were found, .json.
 - `curves/`: evaluations of each policy's training, ALGORITHM[_LABEL]_TASK_seedK.csv.
 """
 

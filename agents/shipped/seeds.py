@@ -1,4 +1,4 @@
-"""The shipped policies by algorithm, task and training seed: the baselines and the seeds beside them."""
+"""Shipped policies by algorithm, task and training seed: the baselines and the seeds beside them."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def load_policy(
 
     Args:
         source: a path with or without suffix; with `elbows`, `env` or `seed` a shipped policy's algorithm.
-        elbows: elbows that it was trained with; those of `env` when None.
-        env: id of the environment that it was trained in; "ElbowArm-v0" when None.
-        seed: of its training; the one with the best return at its evaluation when None.
+        elbows: number of elbows in training; that of `env` when None.
+        env: id of the environment in training; "ElbowArm-v0" when None.
+        seed: seed of the training; the one with the best return at its evaluation when None.
 
     Raises:
         ValueError: there is no such policy, or its files do not fit each other.
@@ -30,7 +30,7 @@ def load_policy(
 
 
 def shipped_path(name: str, seed: int) -> Path:
-    """Where the policy of an algorithm and task, such as "ppo_elbows2", and a training seed is, without suffix.
+    """Path of the policy of an algorithm and task, such as "ppo_elbows2", and a training seed, without suffix.
 
     Raises:
         ValueError: it is not shipped.
@@ -48,5 +48,5 @@ def shipped_seeds(name: str) -> list[int]:
 
 
 def shipped_policies() -> list[str]:
-    """Names of the policies that come with the project, such as "ppo_elbows2_seed0"."""
+    """Names of all shipped policies, such as "ppo_elbows2_seed0"."""
     return sorted(path.stem for folder in (BASELINES, POLICIES) for path in folder.glob("*.json"))

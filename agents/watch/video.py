@@ -1,4 +1,4 @@
-"""Writes moving pictures: GIF through Pillow, MP4 through ffmpeg."""
+"""Video files: GIF through Pillow, MP4 through ffmpeg."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ FRAME_RATES = {".gif": 100.0 / 6.0, ".mp4": 25.0}
 """Pictures per second of each kind of file; both are whole numbers of 50 Hz control periods apart, and GIF counts in
 hundredths of a second."""
 COLOURS = 128
-"""In a GIF's palette."""
+"""Number of colours in a GIF's palette."""
 VIVID = 60
-"""Colours whose channels lie further apart than this are not greys."""
+"""Distance between the channels of a colour beyond which it is no grey (0-255)."""
 
 Pixels = NDArray[np.uint8]
 
@@ -33,10 +33,10 @@ def write_video(path: Path, frames: Iterable[Pixels], frames_per_second: float, 
     """Writes pictures (height, width, 3) to a .gif, which repeats, or an .mp4, whole or not at all.
 
     Args:
-        path: of the file.
+        path: path of the file.
         frames: at least one picture, all of one size.
-        frames_per_second: how fast they follow each other.
-        hold: how long the last one stays [s].
+        frames_per_second: pictures per second [Hz].
+        hold: time for which the last one stays [s].
 
     Raises ValueError on another suffix.
     """

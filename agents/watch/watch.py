@@ -1,4 +1,4 @@
-"""Shows controllers at work: in a window in real time, or in a file, alone or side by side and in step."""
+"""Controllers at work, in a window in real time or in a file, alone or side by side and in step."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from elbow_gym.rendering.viewer import Viewer
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 WINDOW_RATE = 50.0
-"""Pictures per second in a window."""
+"""Pictures per second in a window [Hz]."""
 HOLD = 2.0
-"""How long a file shows its last picture [s]."""
+"""Time for which a file shows its last picture [s]."""
 LABEL_HEIGHT = 30.0
 """Of the label under a picture of 640 by 480 [pixels]."""
 
@@ -69,7 +69,7 @@ class Performance:
             self._over = bool(terminated[0] or truncated[0])
 
     def picture(self) -> Pixels:
-        """What there is to see now, with the label under it."""
+        """Picture of the arm now, with the label under it."""
         return np.concatenate([self._viewer.picture(), self._label])
 
 
@@ -78,7 +78,7 @@ def label(title: str, colour: Colour, size: tuple[int, int]) -> Pixels:
     write = Instruments(*size)
     strip = load_pygame().Surface((size[0], round(LABEL_HEIGHT * write.unit)))
     strip.fill(colour)
-    # Black or white, whichever stands out more by the eye's weights of red, green and blue.
+    # Black or white, whichever has more contrast by the eye's weights of red, green and blue.
     ink: Colour = (0, 0, 0) if np.dot(colour, [0.299, 0.587, 0.114]) > 120.0 else (255, 255, 255)
     write.text(strip, title, (size[0] / 2.0, 6.0 * write.unit), 26, ink, 0.5)
     return pixels_of(strip)
@@ -116,13 +116,13 @@ def watch(
     Without a display and without an `output` the file is named after the controllers.
 
     Args:
-        names: of the controllers.
+        names: names of the controllers.
         env: id of the environment.
         elbows: elbows on the table; the environment's own number when None.
         start: the environment's `start`.
-        seed: of the start pose; the window goes on with the next ones.
-        speed: how many seconds of the arm pass in one of the watcher's.
-        size: of each controller's picture [pixels].
+        seed: seed of the start pose; the window goes on with the next ones.
+        speed: simulated time per second of real time [s/s].
+        size: width and height of each controller's picture [pixels].
         output: a .gif or .mp4 to write instead of opening a window.
 
     Returns:

@@ -1,1 +1,1 @@
-"""What motion costs."""
+"""Energy benchmark: every controller in every regime."""

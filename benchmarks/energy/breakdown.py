@@ -29,13 +29,13 @@ class Share(NamedTuple):
     elbows: int
     whole: Array
     start_step: Array
-    """Regime A minus regime C: what the step from the paper's pose costs."""
+    """Energy of the step from the paper's pose [J], (n,): regime A minus regime C."""
     sag: Array
-    """Regime C minus the exact motion in the paper's posture: what the PD's error, and its own start, change."""
+    """Energy of the PD's error and its start [J], (n,): regime C minus the exact motion in the paper's posture."""
     posture: Array
-    """The exact motion in the paper's posture minus that in the posture of least copper loss at rest."""
+    """Energy of the posture [J], (n,): the exact motion in the paper's minus that in the one of least copper loss."""
     least: Array
-    """The exact motion in that posture."""
+    """Energy of the exact motion in the posture of least copper loss at rest [J], (n,)."""
 
 
 class Motions(NamedTuple):

@@ -1,4 +1,4 @@
-"""Results of single cells on disk, so that an interrupted benchmark goes on; a result's key says what made it."""
+"""Results of single cells on disk, with which an interrupted benchmark goes on."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from agents.files import write_whole
 
 ROOT = Path(__file__).parents[2]
 CODE = ("elbow_gym/**/*.py", "agents/control/*.py", "agents/evaluation/*.py", "agents/tasks.py")
-"""Files whose text makes the results what they are."""
+"""Patterns of the files that the results depend on."""
 PICTURES = "rendering"
-"""The folder of elbow_gym that only draws."""
+"""Folder of elbow_gym that only draws, so that no result depends on it."""
 
 Results = dict[str, dict[str, NDArray[np.float64]]]
 
 
 def key(question: Mapping[str, Any]) -> str:
-    """A name for a result: the digest of what was asked, in JSON types, and of the code that answers it."""
+    """Name of a result: digest of its question, in JSON types, and of the code."""
     text = json.dumps(question, sort_keys=True)
     return hashlib.sha256(f"{code()}{text}".encode()).hexdigest()[:32]
 
@@ -41,7 +41,7 @@ def code() -> str:
 
 
 def load(name: str, folder: Path) -> Results | None:
-    """A stored result by its key, or None."""
+    """Stored result with a key, or None."""
     path = folder / f"{name}.npz"
     if not path.is_file():
         return None
@@ -54,6 +54,6 @@ def load(name: str, folder: Path) -> Results | None:
 
 
 def store(name: str, results: Results, folder: Path) -> None:
-    """Keeps a result under its key."""
+    """Stores a result under its key."""
     arrays = {f"{regime}/{metric}": array for regime, of in results.items() for metric, array in of.items()}
     write_whole(folder / f"{name}.npz", lambda temporary: np.savez(temporary, **arrays))

@@ -1,4 +1,4 @@
-"""The front of energy against tracking error, and where the controllers stand beside it."""
+"""Front of energy against tracking error, with the controllers beside it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Mark(NamedTuple):
     error: float
     energy: float
     gain: float = 1.0
-    """Of the PD, times the paper's."""
+    """Factor on both gains of the paper's PD [-]."""
 
 
 def marks(rows: Sequence[Row]) -> list[Mark]:

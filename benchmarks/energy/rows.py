@@ -19,8 +19,8 @@ class Row:
     """Interquartile mean of each joint's signed electrical energy [J]."""
     part: str = "nominal"
     gain: float = 1.0
-    """Of the PD, times the paper's."""
+    """Factor on both gains of the paper's PD [-]."""
     seeds: tuple[dict[str, float], ...] = ()
-    """Of a learned controller: each training seed and its interquartile means over the episodes."""
+    """Training seeds of a learned controller, each with its interquartile means over the episodes."""
     gap: float | None = None
     """The optimality gap (J - J_opt) / |J_opt| with J = -return; None where no bound was sought."""

@@ -35,7 +35,7 @@ def interquartile_mean(samples: ArrayLike) -> Estimate:
 
     Samples of several training seeds, (seeds, episodes), count together; a resampling draws seeds first and then
     episodes within each, since episodes of one policy are not independent. The resampling is seeded, so the same
-    samples give the same figures. NaN samples give NaN.
+    samples give the same estimate. NaN samples give NaN.
     """
     rows = np.atleast_2d(np.asarray(samples, dtype=np.float64))
     flat, value = rows.ravel(), center(rows)

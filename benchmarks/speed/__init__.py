@@ -1,1 +1,1 @@
-"""What simulation costs."""
+"""Speed benchmark: this project and its peers on the same arm and machine."""

@@ -1,4 +1,4 @@
-"""What is timed through Gymnasium and Stable-Baselines3: env.step, vector environments, PPO, and starting up."""
+"""Contenders that run through Gymnasium and Stable-Baselines3: env.step, vector environments, PPO, starting up."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figure of `python -m benchmarks speed`: an RK4 step by contender, and its cost against the number of joints."""
+"""Figure of the speed benchmark: an RK4 step by contender, and its time against the number of joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is timed: this project's kernel and simulator, and the paper's method in NumPy. Peers stand in peers.py."""
+"""Contenders of this project: kernel, simulator, and the paper's method in NumPy. Peers are in peers.py."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from elbow_gym.parameters import ArmParameters, LinkParameters, MotorParameters,
 
 Array = NDArray[np.float64]
 Sampler = Callable[[float], float]
-"""Works for about so many seconds and returns the seconds that one unit took."""
+"""Function that works for about a number of seconds [s] and returns the time of one unit [s]."""
 
 CLOCKS: dict[str, Callable[[], float]] = {"cpu": time.process_time, "wall": time.perf_counter}
 TIMESTEP = 0.002
@@ -26,22 +26,22 @@ EVALUATION, RK4_STEP, EULER_STEP, ENV_STEP = "evaluation", "RK4 step", "Euler st
 
 @dataclass(frozen=True, kw_only=True)
 class Contender:
-    """One row of the table: what is timed, on which arm, and how to set it up."""
+    """Row of the table: a unit of work, its arm, and how to set it up."""
 
     family: str
     name: str
     unit: str
     make: Callable[[ExitStack], Sampler]
-    """Sets up, closing what must be closed on the stack. ImportError when a library is missing."""
+    """Function that sets up a sampler and leaves what must be closed on the stack; ImportError without a library."""
     joints: int | None = None
     elbows: int | None = None
     arms: int = 1
     threads: int = 1
     clock: str = "cpu"
     rounds: int | None = None
-    """Samples, where not as many as the rest; a contender with its own number is timed alone, after the rounds."""
+    """Number of samples; with None one in each round, otherwise the contender is timed alone, after the rounds."""
     seconds: float | None = None
-    """About how long a sample takes, where not as long as the rest."""
+    """Approximate duration of a sample [s]; that of the others when None."""
 
 
 def timed(work: Callable[[], Any], units: int, clock: str = "cpu") -> Sampler:
@@ -79,7 +79,7 @@ PAPER_CASE = (10, 2)
 CASES = ((10, 0), (10, 1), PAPER_CASE, (4, 1), (20, 2), (40, 2))
 """Number of joints and of elbows of every arm that is timed."""
 MOST_ELBOWS = (20, 8)
-"""The arm that only this project is timed with."""
+"""Numbers of joints and elbows of the arm that only this project is timed with."""
 
 
 def start_poses(arm: ArmParameters, elbows: tuple[int, ...], num_envs: int) -> Array:

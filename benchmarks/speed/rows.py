@@ -1,4 +1,4 @@
-"""One row of the speed benchmark, and how it compares with MuJoCo's."""
+"""Rows of the speed benchmark, and their ratios to MuJoCo's."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ RATIO = "MuJoCo / this"
 
 @dataclass(frozen=True)
 class Row:
-    """What a contender took per unit, in seconds of its clock."""
+    """Times of a contender per unit, in seconds of its clock."""
 
     contender: Contender
     samples: tuple[float, ...]
@@ -36,9 +36,9 @@ class Row:
 
 
 def ratios(rows: Sequence[Row]) -> list[float | None]:
-    """How many times longer MuJoCo takes for the same on the same arm.
+    """MuJoCo's time over each row's, for the same unit of the same arm; None where MuJoCo has none.
 
-    Steps are held against MuJoCo's RK4 step in a C loop, evaluations against mj_forward, and an environment step
+    Steps are compared with MuJoCo's RK4 step in a C loop, evaluations against mj_forward, and an environment step
     against as many of those RK4 steps as it holds.
     """
     peers = {

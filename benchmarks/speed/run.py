@@ -1,4 +1,4 @@
-"""`python -m benchmarks speed`: this project and its peers, one interleaved run, one table, CSV, JSON and a figure."""
+"""Run of the speed benchmark: this project and its peers in interleaved rounds; table, CSV, JSON and a figure."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def measure(
     Args:
         chosen: the contenders.
         quick: few and short samples.
-        progress: gets what is going on and the seconds of planned work done since the last call.
+        progress: called with the name of the work and the planned seconds done since its last call.
 
     Returns:
         The rows, and the families that were skipped (all or in part) with the reason.
@@ -81,14 +81,14 @@ def measure(
 
 
 def missing_library() -> tuple[type[Exception], ...]:
-    """What is raised when an optional library is not there."""
+    """Errors that a missing optional library raises."""
     from gymnasium.error import DependencyNotInstalled
 
     return ImportError, DependencyNotInstalled
 
 
 def planned(contender: Contender, quick: bool) -> float:
-    """About how long one sample takes [s]."""
+    """Approximate duration of one sample [s]."""
     if contender.rounds is None and quick:
         return QUICK_SECONDS
     return contender.seconds or SECONDS
@@ -143,7 +143,7 @@ def markdown(rows: Sequence[Row]) -> str:
 
 
 def table(rows: Sequence[Row]) -> Any:
-    """The same for the terminal."""
+    """Table for the terminal."""
     from rich.table import Table
 
     body = Table(title="Time per unit and arm: median and quartiles")
@@ -179,7 +179,7 @@ def speed(output: Path = RESULTS, quick: bool = False) -> list[Row]:
 
     Args:
         output: folder for the results.
-        quick: few and short samples, to see that all works; the figures mean little then.
+        quick: take few and short samples, which show that everything runs; the times mean little then.
     """
     from rich.console import Console
     from tqdm import tqdm

@@ -1,4 +1,4 @@
-"""The paper's PD controller (eqs 27-29), written against the observation alone."""
+"""PD controller of the paper (eqs 27-29), which reads the observation alone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from elbow_gym.vector_env import ElbowArmVectorEnv
 
 PAPER_KP = 500.0
 PAPER_KD = 20.0
-# Arguments of the environments that it acts in. Unclipped it peaks at 377 V: the limit only has to stay out of its way.
+# Arguments of the environments that the PD acts in. Unclipped it peaks at 377 V, well within the limit.
 UNLIMITED: dict[str, Any] = {
     "control_frequency": 10_000.0,
     "timestep": 1e-4,
@@ -28,7 +28,7 @@ class PDController:
     """v = kp (q_d - q) + kd (q_d_dot - q_dot) on every joint (eq. 27), in volts, then in the action's unit.
 
     q_d keeps the start pose but for joints 1, n-1 and n, which put the hand on the target (eq. 29); q_d_dot is its
-    exact derivative. Stable where the environment reads it at 2 kHz (its arguments `CLIPPED`), not at 1 kHz.
+    exact derivative. The control is stable at 2 kHz, as with the environment's arguments `CLIPPED`, not at 1 kHz.
 
     Args:
         env: the environment that it will act in, single or batched.
@@ -36,7 +36,7 @@ class PDController:
         kd: derivative gain [V s/rad].
 
     Raises:
-        ValueError: the circle is out of reach of joints 1, n-1 and n, by how much.
+        ValueError: the circle is out of reach of joints 1, n-1 and n; the message has the distance missing.
     """
 
     def __init__(self, env: ElbowArmEnv | ElbowArmVectorEnv, kp: float = PAPER_KP, kd: float = PAPER_KD) -> None:

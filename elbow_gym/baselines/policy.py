@@ -1,4 +1,4 @@
-"""Policies as safetensors and JSON: they run on NumPy alone and refuse an environment they were not made for."""
+"""Policies as safetensors and JSON, which run on NumPy alone and refuse an environment they were not made for."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 BASELINES = Path(__file__).parent / "policies"
-"""One policy for each algorithm and task, ALGORITHM[_LABEL]_TASK_seedK: the best of its training seeds."""
+"""Folder of the baselines: the best training seed of each algorithm and task, ALGORITHM[_LABEL]_TASK_seedK."""
 FORMAT = 1
 Weights = dict[str, NDArray[np.float32]]
 Layer = Callable[[NDArray[np.float32]], NDArray[np.float32]]
@@ -31,7 +31,7 @@ ACTIVATIONS: dict[str, Layer] = {
     "silu": lambda x: x * np.exp(-np.logaddexp(0.0, -x)),
 }
 OUTPUTS: dict[str, Layer] = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
-"""How the last layer becomes an action: PPO's is clipped, SAC's squashed."""
+"""Functions that turn the last layer into an action: PPO's is clipped, SAC's squashed."""
 
 
 @dataclass(frozen=True)
@@ -39,34 +39,40 @@ class PolicyCard:
     """Everything about a policy but its weights."""
 
     algorithm: str
+    """Name of the algorithm, such as "ppo"."""
     environment: dict[str, Any]
-    """`Settings` of the environment it was trained for, JSON types only."""
+    """Arguments of the environment in training, the fields of `Settings`, JSON types only."""
     observation: tuple[str, ...]
     """Names and units of the observation's entries."""
     layers: tuple[int, ...]
-    """Sizes from observation to action."""
+    """Numbers of units in the layers, from the observation to the action."""
     activation: str
-    """Between the layers, one of `ACTIVATIONS`."""
+    """Activation function between the layers, one of `ACTIVATIONS`."""
     command: str
-    """What made it."""
+    """Command line that trained the policy."""
     env: str = "ElbowArm-v0"
-    """Gymnasium's id of that environment."""
+    """Gymnasium id of the environment in training."""
     output: str = "clip"
-    """Of the last layer, one of `OUTPUTS`."""
+    """Function after the last layer, one of `OUTPUTS`."""
     digest: str = ""
-    """SHA-256 of the weights."""
+    """SHA-256 of the weights; filled in when empty."""
     observation_version: int = OBSERVATION_VERSION
+    """Version of the observation's entries in training."""
     format: int = FORMAT
+    """Version of the files' format."""
     training: dict[str, Any] = field(default_factory=dict[str, Any])
+    """Settings, seed and length of the training, JSON types only."""
     evaluation: dict[str, Any] = field(default_factory=dict[str, Any])
+    """Metrics by name at the evaluation that chose the policy."""
     versions: dict[str, str] = field(default_factory=dict[str, str])
+    """Versions of the libraries by name."""
 
 
 class Policy:
     """A deterministic multilayer perceptron with SB3's `predict`.
 
     Args:
-        card: what it is.
+        card: everything about the policy but its weights.
         weights: `weight_k` (out, in) and `bias_k` (out,) of every layer k.
 
     Raises:
@@ -91,7 +97,7 @@ class Policy:
         self.weights: Weights = dict(weights)
 
     def check(self, env: ElbowArmEnv | ElbowArmVectorEnv) -> None:
-        """Raises ValueError when the environment's observation or action is not the one that it was trained with."""
+        """Raises ValueError when the environment's observation or action is not the one of the training."""
         if self.card.observation_version != OBSERVATION_VERSION:
             raise ValueError(
                 f"observation_version of the policy must be {OBSERVATION_VERSION}, got {self.card.observation_version}"
@@ -109,7 +115,7 @@ class Policy:
 
     @property
     def settings(self) -> Settings:
-        """The environment that it was trained in."""
+        """Settings of the environment in training."""
         return Settings(**self.card.environment)
 
     def predict(
@@ -126,7 +132,7 @@ class Policy:
         return OUTPUTS[self.card.output](x).astype(np.float32, copy=False), None
 
     def module(self) -> Any:
-        """The same as a `torch.nn.Sequential` that maps observations to actions, for whoever trains on."""
+        """The network as a `torch.nn.Sequential` that maps observations to actions, to train further."""
         import torch
 
         kinds = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU, "silu": torch.nn.SiLU}
@@ -155,8 +161,8 @@ def load_policy(source: str | Path, elbows: int | None = None, env: str | None =
 
     Args:
         source: a path with or without suffix; with `elbows` or `env` a baseline's algorithm.
-        elbows: elbows that it was trained with; those of `env` when None.
-        env: id of the environment that it was trained in; "ElbowArm-v0" when None.
+        elbows: number of elbows in training; that of `env` when None.
+        env: id of the environment in training; "ElbowArm-v0" when None.
 
     Raises:
         ValueError: there is no such policy, or its files do not fit each other.

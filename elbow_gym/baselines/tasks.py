@@ -1,15 +1,15 @@
-"""Short names of the registered environments and their elbow counts, as policies' files carry them."""
+"""Short names of tasks, a registered environment with a number of elbows, as the files of policies have them."""
 
 from __future__ import annotations
 
 from typing import Any
 
 ENVIRONMENTS = {"ElbowArm-v0": "elbows", "ElbowArmTable-v0": "table", "ElbowArmRandom-v0": "random"}
-"""Ids of the environments and what a task in them is called; the elbow count follows "elbows"."""
+"""Short name of a task by the id of its environment; the number of elbows follows "elbows"."""
 
 
 def registered_arguments(env: str) -> dict[str, Any]:
-    """The arguments that an id stands for. Raises ValueError for an id that is not in `ENVIRONMENTS`."""
+    """Arguments that an id was registered with. Raises ValueError for an id that is not in `ENVIRONMENTS`."""
     from gymnasium import spec
 
     if env not in ENVIRONMENTS:

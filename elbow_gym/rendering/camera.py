@@ -1,4 +1,4 @@
-"""A pinhole camera as a pure function: world points to pixels."""
+"""Pinhole camera as a pure function from world points to pixels."""
 
 from __future__ import annotations
 
@@ -11,33 +11,33 @@ from numpy.typing import ArrayLike
 from elbow_gym.parameters import Array
 
 ELEVATION = math.radians(27.0)
-"""How far the camera looks down."""
+"""Angle of the camera below the horizontal [rad]."""
 VIEW_ANGLE = math.radians(34.0)
-"""Between the left and the right edge of the framed part of the picture."""
+"""Angle between the left and the right edge of the framed part of the picture [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Camera:
-    """Where it stands, which way it looks, and how large a picture it takes."""
+    """Position, direction and scale of a camera."""
 
     eye: Array
-    """Position [m], (3,)."""
+    """Position of the camera [m], (3,)."""
     axes: Array
     """Unit vectors of the picture's right, up and into the picture, rows of (3, 3)."""
     focal_length: float
     """Pixels per unit of tangent."""
     centre: tuple[float, float]
-    """Pixel (x right, y down) that it looks straight at."""
+    """Pixel on the camera's axis (x right, y down)."""
 
     def project(self, points: ArrayLike) -> Array:
         """Pixels (..., 2), x right and y down from the upper left corner, of world points [m], (..., 3).
 
-        Points behind the camera land as if they stood just before it.
+        Points behind the camera are projected as if they were just before it.
         """
-        seen = (np.asarray(points, dtype=np.float64) - self.eye) @ self.axes.T
-        scale = self.focal_length / np.maximum(seen[..., 2], 1e-3)
+        local = (np.asarray(points, dtype=np.float64) - self.eye) @ self.axes.T
+        scale = self.focal_length / np.maximum(local[..., 2], 1e-3)
         x, y = self.centre
-        return np.stack([x + scale * seen[..., 0], y - scale * seen[..., 1]], axis=-1)
+        return np.stack([x + scale * local[..., 0], y - scale * local[..., 1]], axis=-1)
 
     def depth(self, points: ArrayLike) -> Array:
         """Distance into the picture [m], (...), of world points [m], (..., 3)."""
@@ -48,16 +48,16 @@ class Camera:
         return self.focal_length / np.maximum(self.depth(points), 1e-3)
 
     def enlarged(self, factor: float) -> Camera:
-        """The same picture with `factor` times as many pixels each way."""
+        """Camera of the same view with `factor` times as many pixels each way."""
         x, y = self.centre
         return replace(self, focal_length=factor * self.focal_length, centre=(factor * x, factor * y))
 
 
 def framing(points: ArrayLike, azimuth: float, frame: tuple[float, float, float, float]) -> Camera:
-    """The nearest camera that sees all points inside a frame of its picture.
+    """Nearest camera that has all points inside a frame of its picture.
 
     Args:
-        points: what has to be seen [m], (m, 3).
+        points: points to be shown [m], (m, 3).
         azimuth: direction from the scene to the camera [rad], about z from x.
         frame: left, top, width and height of the part of the picture that is to hold them [pixels].
     """
@@ -69,12 +69,12 @@ def framing(points: ArrayLike, azimuth: float, frame: tuple[float, float, float,
     into = np.array([-level * cosine, -level * sine, -down])
     axes = np.stack([right, np.cross(right, into), into])
     focal_length = width / (2.0 * math.tan(VIEW_ANGLE / 2.0))
-    seen = points @ axes.T
+    local = points @ axes.T
     # Along a picture axis a point must lie within +-t times its depth of the eye: two half-planes for the eye.
     eye, depth = np.zeros(3), math.inf
     for axis, size in ((0, width), (1, height)):
         t = size / (2.0 * focal_length)
-        ahead, behind = (t * seen[:, 2] - seen[:, axis]).min(), (t * seen[:, 2] + seen[:, axis]).min()
+        ahead, behind = (t * local[:, 2] - local[:, axis]).min(), (t * local[:, 2] + local[:, axis]).min()
         eye[axis] = (behind - ahead) / 2.0
         depth = min(depth, (ahead + behind) / (2.0 * t))
     eye[2] = depth

@@ -1,4 +1,4 @@
-"""What the picture says in words and bars: time, error, energy, power of each joint, and what the colours mean."""
+"""Text and bars in a picture: time, error, energy, power of each joint, and a legend of the colours."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LARGEST_POWER = 1000.0
 LEAST_POWER = -10.0
 TICKS = (-10.0, 0.0, 10.0, 100.0, 1000.0)
 
-# Letters are drawn so many times larger and shrunk: small fonts put them on whole pixels, unevenly.
+# Letters are drawn this many times larger and shrunk: small fonts put them on whole pixels, unevenly.
 FINER = 4
 
 
@@ -32,15 +32,15 @@ class Instruments:
     """Text and bars on a surface of one size.
 
     Args:
-        width: of the surface [pixels].
-        height: of the surface [pixels].
+        width: width of the surface [pixels].
+        height: height of the surface [pixels].
     """
 
     def __init__(self, width: int, height: int) -> None:
         self._pygame = load_pygame()
         self._width, self._height = width, height
         self.unit = min(width / 640.0, height / 480.0)
-        """Pixels where a picture of 640 by 480 has one."""
+        """Size of what takes one pixel in a picture of 640 by 480 [pixels]."""
         self._fonts: dict[int, Any] = {}
         self._texts: dict[tuple[str, float, Colour], Any] = {}
 

@@ -1,4 +1,4 @@
-"""The arm and its table as shaded shapes on a pygame surface, seen by a camera."""
+"""Shaded shapes of the arm and its table on a pygame surface, in the view of a camera."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TRACE: Colour = (0, 114, 178)
 
 # Direction to the light, over its height: shadows fall away from it.
 LIGHT = np.array([-0.25, 0.3])
-# Round things are painted from their dark rim to the light, in so many steps.
+# Round things are painted from their dark rim to the light, in this many steps.
 SHARES = np.linspace(0.0, 1.0, 6)
 BALL_LIGHT = np.array([-0.3, -0.38])
 LOW_SIDE, HIGH_SIDE = -1.0 + 1.3 * SHARES, 1.0 - 0.62 * SHARES
@@ -40,7 +40,7 @@ WHOLE = np.ones(1)
 
 @lru_cache(4096)
 def mix(first: Colour, second: Colour, share: float) -> Colour:
-    """The colour `share` of the way from the first to the second."""
+    """Colour at a share of the way from the first to the second."""
     red, green, blue = (round(a + (b - a) * share) for a, b in zip(first, second, strict=True))
     return red, green, blue
 
@@ -56,9 +56,9 @@ class Painter:
     """Draws things of the world on one surface.
 
     Args:
-        camera: how the surface sees the world.
+        camera: projection of the world onto the surface.
         size: width and height of the surface [pixels].
-        radius: of a joint as it is drawn [m]; the table's top is drawn so that a joint at z = 0 rests on it.
+        radius: radius of a joint as it is drawn [m]; the table's top is drawn so that a joint at z = 0 rests on it.
         reach: length of the stretched arm [m].
     """
 
@@ -76,7 +76,7 @@ class Painter:
         return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(count, height)], axis=-1)
 
     def _paint_stage(self, size: tuple[int, int]) -> Any:
-        """What never moves: the sky, the table as far as the arm reaches, its grid, the arm's foot."""
+        """Paints what never moves: the sky, the table as far as the arm reaches, its grid, the arm's foot."""
         draw, stage = self._pygame.draw, self._pygame.Surface(size)
         width, height = size
         for y in range(height):
@@ -103,11 +103,11 @@ class Painter:
         return self._camera.depth(world)
 
     def clear(self) -> None:
-        """Back to the empty table."""
+        """Clears the surface to the empty table."""
         self.surface.blit(self._stage, (0, 0))
 
     def on_top(self, world: Array) -> Array:
-        """Where the light casts points [m], (m, 3), onto the drawn table; points under it stay beneath themselves."""
+        """Shadows of points [m], (m, 3), on the drawn table; a point under it is moved straight up or down."""
         cast = world.copy()
         cast[:, :2] -= np.maximum(world[:, 2:] + self._radius, 0.0) * LIGHT
         cast[:, 2] = -self._radius

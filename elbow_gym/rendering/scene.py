@@ -1,4 +1,4 @@
-"""Draws one arm from plain arrays: the scene in perspective, its forces, and its meters."""
+"""Pictures of one arm from plain arrays: the scene in perspective, its forces, and its meters."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from elbow_gym.rendering.screen import Pixels, load_pygame, pixels_of
 
 SMALLEST_SIZE = 64
 SUPERSAMPLING = 2
-"""The scene is drawn with so many times the pixels each way and shrunk, which smooths every edge."""
+"""Factor by which the scene is drawn larger each way before it is shrunk, which smooths every edge."""
 SMALLEST_FORCE = 0.05
-"""Forces below it [N] are not drawn."""
+"""Smallest force that is drawn [N]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """What a picture shows."""
+    """State of an arm as a picture shows it."""
 
     joints: Array
     """Positions of joints 1..n and, last, the hand [m], (n + 1, 3)."""
     path: Array
     """Closed path of the target [m], (m, 3)."""
     target: Array
-    """[m], (3,)."""
+    """Position of the target [m], (3,)."""
     trace: Array
-    """Where the hand was [m], (k, 3), oldest first."""
+    """Past positions of the hand [m], (k, 3), oldest first."""
     elbows: Sequence[int]
     """Joint numbers held on the table or, on a table that cannot pull, borne by it; n + 1 is the hand."""
     contacts: Sequence[int]
     """Joint numbers at which the forces act."""
     forces: Array
-    """Of the table on the arm [N], (len(contacts), 3); those that point down hold the arm down."""
+    """Forces of the table on the arm [N], (len(contacts), 3); those that point down hold the arm down."""
     power: Array
     """Electrical power of each joint [W], (n,)."""
     energy: float
@@ -47,9 +47,9 @@ class Scene:
     error: float
     """Distance from hand to target [m]."""
     time: float
-    """Since the start [s]."""
+    """Time since the start [s]."""
     support: tuple[str, str]
-    """What carries the arm: a number and what it counts."""
+    """Number of supports of the arm, and the word for them."""
     may_pull: bool = True
     """Whether some of the contacts can hold the arm down."""
     payload: float = 0.0
@@ -58,16 +58,16 @@ class Scene:
 
 @dataclass(frozen=True, kw_only=True)
 class Stage:
-    """What stays the same from picture to picture."""
+    """Quantities that stay the same from picture to picture."""
 
     reach: float
     """Length of the stretched arm [m]."""
     weight: float
-    """Of the whole arm [N]; arrows of forces are drawn against it."""
+    """Weight of the whole arm [N], which sets the scale of the forces' arrows."""
     radius: float
-    """Of a joint as it is drawn [m]."""
+    """Radius of a joint as it is drawn [m]."""
     seen: Array
-    """Points that the picture has to hold [m], (m, 3)."""
+    """Points that the picture has to show [m], (m, 3)."""
     azimuth: float
     """Direction from the scene to the camera [rad], about z from x."""
 
@@ -76,9 +76,9 @@ class Renderer:
     """Pictures of one size; everything is drawn in memory, without a display.
 
     Args:
-        stage: what stays the same.
-        width: of a picture [pixels].
-        height: of a picture [pixels].
+        stage: quantities that stay the same from picture to picture.
+        width: width of a picture [pixels].
+        height: height of a picture [pixels].
         accent: colour of the hand's trace and of the bars.
     """
 

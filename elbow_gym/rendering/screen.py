@@ -1,4 +1,4 @@
-"""pygame-ce, imported only where something is drawn: fonts, pixels, and the window that shows them."""
+"""Fonts, pixels and the window of pygame-ce, which is imported only where something is drawn."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def pixels_of(surface: Any) -> Pixels:
 
 
 def display_driver() -> str | None:
-    """What windows would be shown with; None where nobody would see them."""
+    """Name of SDL's driver for windows; None where there is no display."""
     pygame = load_pygame()
     ready = pygame.display.get_init()
     try:
@@ -56,7 +56,7 @@ class Window:
     pygame has one display: another window's next picture takes it over.
 
     Args:
-        title: what its bar says.
+        title: text in the bar of the window.
     """
 
     _shown: ClassVar[Window | None] = None
@@ -86,7 +86,7 @@ class Window:
         pygame.event.clear()
 
     def close(self) -> None:
-        """Takes the window away. May be called twice."""
+        """Closes the window. May be called twice."""
         if Window._shown is self:
             load_pygame().display.quit()
             Window._shown = None

@@ -1,4 +1,4 @@
-"""What the environments show: the scenes of their arms, with the hands' traces, as pictures or in a window."""
+"""Pictures and windows of the environments: scenes of their arms with the hands' traces."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from elbow_gym.task.episodes import Episodes
 
 RENDER_MODES = ("human", "rgb_array")
 HIGHEST_RATE = 60.0
-"""Windows show, and traces keep, at most so many instants per second of the arm's time."""
+"""Highest rate of pictures in a window, and of points of a trace, per second of simulated time [Hz]."""
 TRACE_TIME = 5.0
-"""How long a trace is [s]."""
+"""Length of a trace [s]."""
 POWER_TIME = 0.1
-"""Power is the mean of so long [s]."""
+"""Time over which the power that is shown is averaged [s]."""
 # A window shows at most two by two arms.
 SHOWN_ARMS = 4
 
 
 class Viewer:
-    """Follows B arms and draws them. It reads their state and changes nothing.
+    """Pictures of B arms as they move. It reads their state and changes nothing.
 
     Args:
         episodes: the arms.
-        render_mode: "rgb_array", "human", or None for an onlooker that never draws and costs nothing.
-        render_width: of each picture [pixels].
-        render_height: of each picture [pixels].
+        render_mode: "rgb_array", "human", or None for a viewer that never draws and costs nothing.
+        render_width: width of each picture [pixels].
+        render_height: height of each picture [pixels].
         accent: colour of the hands' traces and of the bars.
 
     Raises ValueError naming the argument; the sides are whole numbers of at least 64 pixels.
@@ -72,7 +72,7 @@ class Viewer:
         return {**self.__dict__, "_renderer": None, "_window": Window("elbow_gym")}
 
     def restart(self, mask: NDArray[np.bool_] | None = None) -> None:
-        """Forgets the traces of the arms in `mask`, all when None, which are somewhere else now."""
+        """Clears the traces of the arms in `mask`, all when None, which start anew."""
         if self._mode is None:
             return
         self._age[slice(None) if mask is None else mask] = 0
@@ -81,7 +81,7 @@ class Viewer:
             self._show()
 
     def follow(self) -> None:
-        """Takes note of where the arms are after a control step."""
+        """Records the positions of the hands after a control period."""
         self._steps += 1
         if self._mode is None or self._steps % self._every:
             return
@@ -118,7 +118,7 @@ class Viewer:
         return (past[-1][1][i] - past[0][1][i]) / passed
 
     def scene(self, i: int = 0) -> Scene:
-        """What there is to see of arm i now."""
+        """Scene of arm i now."""
         episodes, simulator = self._episodes, self._episodes.simulator
         population = episodes.population
         moved = "length" in population.randomization.ranges or population.changed
@@ -162,13 +162,13 @@ class Viewer:
 
     @property
     def renderer(self) -> Renderer:
-        """What draws the pictures, made when first asked for."""
+        """Renderer of the pictures, made when it is first needed."""
         if self._renderer is None:
             self._renderer = Renderer(stage_of(self._episodes), *self._size, self._accent)
         return self._renderer
 
     def picture(self, i: int = 0) -> Pixels:
-        """A fresh picture (height, width, 3) of arm i."""
+        """New picture (height, width, 3) of arm i."""
         return self.renderer.draw(self.scene(i))
 
     def _show(self) -> None:
@@ -181,12 +181,12 @@ class Viewer:
         self._window.show(np.concatenate(rows), self._rate)
 
     def close(self) -> None:
-        """Takes the window away. May be called twice."""
+        """Closes the window. May be called twice."""
         self._window.close()
 
 
 def stage_of(episodes: Episodes) -> Stage:
-    """How the camera looks at these arms: across an arm that is on its path, with the way there in sight."""
+    """Stage for these arms: the camera views an arm on its path from the side, with the way there in the picture."""
     arm, length = episodes.arm, episodes.arm.of_links("length")
     reach = float(length.sum())
     path = episodes.circle.widest.position(np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False))

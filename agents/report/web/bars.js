@@ -6,7 +6,7 @@ import { limits, makeScale } from "./scale.js";
 import { html } from "./svg.js";
 
 export class JointBars {
-  /** `onJoint(number)` is called when a joint is chosen; 0 stands for all. */
+  /** `onJoint(number)` is called when a joint is chosen; 0 means all. */
   constructor(host, nJoints, onJoint) {
     this.rows = [];
     const body = html("tbody");

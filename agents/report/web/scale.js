@@ -53,7 +53,7 @@ const TICKS = {
     const room = length / ((high > 1 ? largest : 1) + (low < -1 ? largest : 1));
     const step = room > 22 ? 1 : room > 12 ? 2 : 3;
     const ticks = [0];
-    // 1 stands close to 0.
+    // 1 is close to 0.
     const first = room > 34 ? 0 : step;
     for (let k = first; k <= largest; k += step) ticks.push(10 ** k, -(10 ** k));
     return ticks;

@@ -1,4 +1,4 @@
-/** What the page shows: two runs, a time and from when on energy is counted; who draws is told of changes. */
+/** State of the page: two runs, a time and the start of the energy count; listeners are called on changes. */
 
 import { load, report } from "./data.js";
 
