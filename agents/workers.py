@@ -1,4 +1,4 @@
-"""Long jobs in processes of their own, side by side, with one stream of progress; and what must happen before."""
+"""Long jobs side by side in processes, with one stream of progress, and the compilation before them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BATCH = 16
 PATIENCE = 2.0
 """Time after which a compilation is announced [s]."""
 COMPILE_SECONDS = 15
-"""About the time that one kernel takes to compile [s]."""
+"""Approximate time that one kernel takes to compile [s]."""
 WITHOUT_KERNEL: dict[str, Any] = {
     "control_frequency": 50.0,
     "timestep": None,
@@ -36,7 +36,7 @@ Tell = Callable[[int], Any]
 
 
 class _WithoutNotice:
-    """A stream without the kernel's own notices that it compiles."""
+    """Stream without the kernel's notices that it compiles."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream, self._dropped = stream, False
@@ -53,13 +53,13 @@ class _WithoutNotice:
 
 
 def compile_before(batches: Iterable[Settings | tuple[Settings, int]]) -> None:
-    """Has the kernels compiled that environments will need, here and one after the other, before processes start.
+    """Compiles the kernels that environments will need, here and one after the other, before processes start.
 
     Otherwise each process would compile the same kernel at the same time. Nothing is compiled or said when Numba's
     cache has them; one line on stderr says about how long it takes when it has not.
 
     Args:
-        batches: settings of the environments, each alone or with the number of arms side by side; alone they stand for
+        batches: settings of the environments, each alone or with the number of arms side by side; alone they mean
             a batch. Up to two arms have another kernel than more.
     """
     import numpy as np

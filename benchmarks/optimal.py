@@ -30,6 +30,9 @@ FRONT_WEIGHTS = (0.0002, 0.002, 0.005)
 ELBOW_COUNTS = (2, 0, 1)
 MAKER = "python -m benchmarks optimal"
 
+STEPPING = ("timestep", "integrator")
+"""Arguments of an environment that say how it is simulated."""
+
 
 @dataclass(frozen=True)
 class Cell:
@@ -68,7 +71,9 @@ class Cell:
     def question(self) -> dict[str, Any]:
         """Question in JSON types; a stored result is used only where its question is the same."""
         problem = self.problem
-        return json.loads(json.dumps({**problem.settings.arguments, "above_table": problem.above_table}))
+        # The program has a mesh of its own: it knows neither of these.
+        asked = {name: value for name, value in problem.settings.arguments.items() if name not in STEPPING}
+        return json.loads(json.dumps({**asked, "above_table": problem.above_table}))
 
 
 def cells(front: bool = True) -> list[Cell]:

@@ -93,7 +93,8 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | elbows | 2 | 0, 1, 2 as in the paper (joints (), (4,), (4, 7)), or a tuple of joint numbers |
     | arm | "paper" | preset name, an `ArmParameters`, or its JSON dict |
     | control_frequency | 50.0 | control periods, each with one action, per second [Hz] |
-    | timestep | None | longest RK4 step [s]: 0.002, with a table 0.001 |
+    | timestep | None | longest step of the integrator [s], refused where it is too long; None: chosen for accuracy |
+    | integrator | "exponential" | Runge-Kutta of order 4 with exact decay of the currents, or "rk4" for the classical |
     | duration | 5.0 | episode length [s] |
     | voltage_limit | 24.0 | supply voltage of every motor [V] |
     | action_unit | "fraction" | "fraction" of the supply voltage, or "volt" |
@@ -115,7 +116,8 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     picture.
 
     `info` holds tracking_error [m], electrical_power [W], electrical_energy, drawn_energy and link_work [J] since the
-    reset, reward_tracking, reward_energy, voltage [V], elbow_force [N] and below_table [s].
+    reset, reward_tracking, reward_energy, voltage [V], elbow_force [N], constraint_residual [m/s^2], the
+    vertical acceleration that an elbow has in spite of its force, and below_table [s].
 
     A table adds contact_force [N] (joints 3 to n and the hand; radial, tangential, normal), load_bearing and
     contact_loss [J]; heat adds temperature_rise [K] and overheated; a supply's resistance adds supply_loss [J].
@@ -201,7 +203,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             outcome.reward.item(),
             outcome.terminated.item(),
             outcome.truncated.item(),
-            single(outcome.info),
+            of_one(outcome.info),
         )
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -230,11 +232,15 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._viewer.restart()
 
 
+def of_one(info: Mapping[str, Any]) -> dict[str, Any]:
+    """A step's info of the only arm: numbers, truths and arrays."""
+    one = {key: rows[0] for key, rows in info.items()}
+    if "overheated" in one:
+        one["overheated"] = bool(one["overheated"])
+    return one
+
+
 def single(info: Mapping[str, Any]) -> dict[str, Any]:
-    """The info of the only arm: plain numbers and truths, and arrays of their own."""
-    return {
-        key: single(cast("dict[str, Any]", rows))
-        if isinstance(rows, dict)
-        else (rows.item() if rows.ndim == 1 else rows[0])
-        for key, rows in info.items()
-    }
+    """A reset's info of the only arm: that of a step and, in dicts of their own, what was drawn."""
+    drawn = {key: of_one(cast("dict[str, Any]", rows)) for key, rows in info.items() if isinstance(rows, dict)}
+    return {**of_one({key: rows for key, rows in info.items() if key not in drawn}), **drawn}

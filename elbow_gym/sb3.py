@@ -56,8 +56,9 @@ class SB3VecEnv(VecEnv):
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         over = terminated | truncated
         for i in np.flatnonzero(over):
-            final = {key: rows[i] for key, rows in info["final_info"].items() if not key.startswith("_")}
-            infos[i] = {key: float(value) if np.ndim(value) == 0 else value for key, value in final.items()}
+            infos[i] = {key: rows[i] for key, rows in info["final_info"].items() if not key.startswith("_")}
+            if "overheated" in infos[i]:
+                infos[i]["overheated"] = bool(infos[i]["overheated"])
             infos[i]["terminal_observation"] = info["final_obs"][i]
             infos[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
         return observation, reward.astype(np.float32), over, infos

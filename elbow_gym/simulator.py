@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from elbow_gym.checks import as_batch, positive, positive_integer, restore
-from elbow_gym.kernel.build import kernel
+from elbow_gym.kernel.build import announced, kernel
 from elbow_gym.kernel.rows import (
     LARGEST_ANGLE,
     MAXIMUM_ELBOWS,
@@ -25,6 +25,7 @@ from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.simulation.state_views import Readings
+from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep, rates
 from elbow_gym.simulation.thread_pool import Sharing
 
 # A given pose may be off the elbows' plane by this much [m], its rates by this much [m/s].
@@ -33,13 +34,14 @@ RATE_TOLERANCE = 1e-6
 
 
 class Simulator(Readings):
-    """B arms side by side under piecewise constant voltages, by RK4 with the energies integrated alongside.
+    """B arms side by side under piecewise constant voltages, with the energies integrated alongside.
 
     Args:
         arm: an ArmParameters or a preset name.
         elbows: 0, 1, 2 as in the paper, or joint numbers held at z = 0.
         num_envs: B, the number of arms.
-        timestep: RK4 step [s], below 2.7 times the smallest L / R, and at most 0.001 with a table.
+        timestep: length of the steps that `step` takes [s]; refused where it is too long for the arm's fastest rate.
+        integrator: "exponential": Runge-Kutta of order 4 with exact decay of the currents; "rk4": the classical method.
         num_threads: threads over which blocks of arms are spread; the results do not depend on it.
         conditions: fields of `Conditions`: payload, table, elbow_friction, heat, supply_resistance...
 
@@ -53,6 +55,7 @@ class Simulator(Readings):
         num_envs: int = 1,
         *,
         timestep: float = 0.002,
+        integrator: str = "exponential",
         num_threads: int = 1,
         **conditions: Any,
     ) -> None:
@@ -64,21 +67,27 @@ class Simulator(Readings):
         self._num_threads = positive_integer("num_threads", num_threads)
         self.conditions = Conditions(**conditions)
         self.timestep = positive("timestep", timestep)
-        limit, reason = self.conditions.longest_timestep(self.arm)
-        if self.timestep > limit:
-            raise ValueError(f"timestep must be at most {limit:.3g} s (RK4's limit for {reason}), got {timestep}")
+        if integrator not in INTEGRATORS:
+            raise ValueError(f"integrator must be one of {INTEGRATORS}, got {integrator!r}")
+        found = rates(parameter_table(self.arm, self.conditions), self.conditions, elbows=bool(self.elbows))
+        check_timestep(self.timestep, self.timestep, found, integrator)
         self._switches = {
             "table": self.conditions.surface is not None,
             "rubbing": self.conditions.elbow_friction > 0.0 and bool(self.elbows),
             "drive": self.conditions.drive(self.arm),
+            "exponential": integrator == "exponential",
         }
         n = self.arm.n_joints
         self._elbow_index = np.array(self.elbows, dtype=np.int64)
-        rows = SWITCHED_STATE_ROWS if any(self._switches.values()) else STATE_ROWS
+        switched = any(self._switches[name] for name in ("table", "rubbing", "drive"))
+        rows = SWITCHED_STATE_ROWS if switched else STATE_ROWS
         self._state = np.zeros((self.num_envs, rows, n))
         self._summary = np.zeros((self.num_envs, SUMMARY_COLUMNS + len(self.elbows)))
         self._parameters = np.repeat(parameter_table(self.arm, self.conditions)[None], self.num_envs, axis=0)
-        self._steps = np.zeros(self.num_envs, dtype=np.int64)
+        # Timesteps of `step` and control periods since the reset.
+        self._clock = np.zeros((self.num_envs, 2), dtype=np.int64)
+        self.period = 0.0
+        """Length of a control period [s], by which `control_step` moves the clock."""
         self._attach()
         self._nominal = as_batch("nominal_pose", self.arm.nominal_pose, (self.num_envs, n))
         if self.elbows and np.abs(elbow_heights(self.arm, self.arm.nominal_pose, self.elbows)).max() > PLANE_TOLERANCE:
@@ -88,16 +97,13 @@ class Simulator(Readings):
     def _attach(self) -> None:
         # Up to two arms the lanes of a block would mostly idle.
         lanes = 1 if self.num_envs <= 2 else BLOCK_LANES
-        self._advance, _, self._project_poses = kernel(lanes, **self._switches)
+        self._kernel = kernel(lanes, **self._switches)
+        self._called: set[str] = set()
         self._sharing = Sharing(self.num_envs, lanes, self._num_threads)
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the compiled functions and the threads, for pickling and copying."""
-        return {
-            name: value
-            for name, value in self.__dict__.items()
-            if name not in ("_advance", "_project_poses", "_sharing")
-        }
+        return {name: value for name, value in self.__dict__.items() if name not in ("_kernel", "_called", "_sharing")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -132,8 +138,8 @@ class Simulator(Readings):
         self._state[chosen, 2] = current[chosen]
         valid = self._summary[:, VALID].copy()
         self._summary[chosen] = 0.0
-        self._steps[chosen] = 0
-        self._run(np.zeros(q.shape), 0)
+        self._clock[chosen] = 0
+        self._share("refresh", self._state, self._parameters, self._elbow_index, self._summary)
         # Looking at the other arms' last state again does not make it the outcome of their last step.
         self._summary[~chosen, VALID] = valid[~chosen]
 
@@ -152,7 +158,8 @@ class Simulator(Readings):
         """
         settled = as_batch("q", q, (self.num_envs, self.arm.n_joints)).copy()
         if self.elbows:
-            self._project_poses(settled, self._parameters, self._elbow_index)
+            with announced():
+                self._kernel.project_poses(settled, self._parameters, self._elbow_index)
             if not (np.abs(settled).max() < LARGEST_ANGLE):
                 raise ValueError(f"q must be near a pose with the elbows {self.elbows} at z = 0, got {q!r}")
             self._check_on_table(settled, np.zeros_like(settled), self._parameters[:, 0])
@@ -203,42 +210,65 @@ class Simulator(Readings):
         Raises ValueError, with the state untouched, on a wrong shape, a non-finite voltage or n_substeps < 1.
         """
         voltage = as_batch("voltage", voltage, (self.num_envs, self.arm.n_joints))
-        self.advance(np.array(voltage, order="C"), positive_integer("n_substeps", n_substeps))
+        count = positive_integer("n_substeps", n_substeps)
+        self.advance(np.array(voltage, order="C"), np.full(count, self.timestep))
+        self._clock[:, 0] += count
 
-    def advance(self, voltage: Array, n_substeps: int, then: Callable[[int, int], Any] | None = None) -> int:
-        """`step` without its checks, for callers that made them: a contiguous float64 (B, n) of finite volts.
+    def advance(self, voltage: Array, steps: Array) -> None:
+        """Advances every arm through steps of given lengths [s] under constant voltages, without checks or clock.
 
-        Each thread calls `then` with the first and the end of its share of the arms when it has moved them.
-        Returns the number of arms that are not `valid`.
+        For callers that made the checks of `step`: a contiguous float64 (B, n) of finite volts.
         """
-        self._steps += n_substeps
-        return self._run(voltage, n_substeps, then)
+        self._share("advance", self._state, self._parameters, voltage, self._elbow_index, steps, self._summary)
+
+    def control_step(self, actions: tuple[Any, ...], steps: Array, observed: tuple[Any, ...]) -> int:
+        """One control period of every arm, from actions to observations and rewards.
+
+        Args:
+            actions: the arguments of the kernel's `control_step` before the state.
+            steps: lengths of the steps [s].
+            observed: its arguments behind the summary.
+
+        Returns:
+            The number of arms that are not `valid`; a negative one, with nothing changed, where an action is NaN.
+        """
+        # One share looks at its own actions before it moves; several must not move before all are seen.
+        if self._num_threads > 1 and np.isnan(actions[0]).any():
+            return -1
+        own = (self._state, self._parameters, self._elbow_index, steps, self._summary)
+        invalid = self._share("control_step", *actions, *own, *observed)
+        if invalid >= 0:
+            self._clock[:, 1] += 1
+        return invalid
 
     @property
     def raw(self) -> tuple[Array, Array]:
         """The kernel's own state and summary arrays, for functions that only read them."""
         return self._state, self._summary
 
-    def _run(self, voltage: Array, n_substeps: int, then: Callable[[int, int], Any] | None = None) -> int:
-        def run(first: int, end: int) -> int:
-            fixed = (self._state, self._parameters, voltage, self._elbow_index)
-            invalid = self._advance(*fixed, first, end, n_substeps, self.timestep, self._summary)
-            if then is not None:
-                then(first, end)
-            return invalid
+    def _share(self, name: str, *arguments: Any) -> int:
+        """Calls an entry of the kernel for every thread's share of the arms; the sum of what they return."""
+        entry = getattr(self._kernel, name)
 
-        return self._sharing.total(run)
+        def work(first: int, end: int) -> int:
+            return entry(*arguments, first, end) or 0
+
+        if name in self._called:
+            return self._sharing.total(work)
+        with announced():
+            total = self._sharing.total(work)
+        self._called.add(name)
+        return total
 
     def get_state(self) -> dict[str, NDArray[Any]]:
         """A copy of everything that runs on; `set_state` continues from it bit for bit."""
-        return {"state": self._state.copy(), "summary": self._summary.copy(), "steps": self._steps.copy()}
+        return {"state": self._state.copy(), "summary": self._summary.copy(), "clock": self._clock.copy()}
 
     def set_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Takes a state of `get_state` from a simulator of the same size."""
-        own = {"state": self._state, "summary": self._summary, "steps": self._steps}
-        restore(own, state)
+        restore({"state": self._state, "summary": self._summary, "clock": self._clock}, state)
 
     @property
     def time(self) -> Array:
         """Time since the reset [s], (B,)."""
-        return np.asarray(self._steps * self.timestep, dtype=np.float64)
+        return self._clock[:, 0] * self.timestep + self._clock[:, 1] * self.period

@@ -29,7 +29,6 @@ Env = ElbowArmEnv | ElbowArmVectorEnv
 
 COMPUTED: dict[str, Any] = {
     "control_frequency": 500.0,
-    "timestep": 0.002,
     "voltage_limit": 24.0,
     "action_unit": "volt",
 }

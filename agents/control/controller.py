@@ -1,4 +1,4 @@
-"""The protocol of a controller: an object with Stable-Baselines3's `predict`."""
+"""Protocol of a controller: an object with Stable-Baselines3's `predict`."""
 
 from __future__ import annotations
 

@@ -75,7 +75,8 @@ def linearised_periods(settings: Settings, trajectory: Trajectory) -> tuple[Arra
     arm, elbows, n = settings.parsed_arm, settings.elbow_joints, settings.parsed_arm.n_joints
     size = 4 * n
     nudge = np.concatenate([np.eye(size), -np.eye(size)]) * STEP
-    simulator = Simulator(arm, elbows, 2 * size, timestep=settings.control_period / settings.n_substeps)
+    steps = settings.substeps
+    simulator = Simulator(arm, elbows, 2 * size, timestep=float(steps.min()), integrator=settings.integrator)
     states, inputs = [], []
     for q, q_dot, current, voltage in zip(
         trajectory.q[:-1], trajectory.q_dot[:-1], trajectory.current[:-1], trajectory.voltage, strict=True
@@ -87,7 +88,7 @@ def linearised_periods(settings: Settings, trajectory: Trajectory) -> tuple[Arra
             for k, (jacobian, inverse) in enumerate(zip(jacobians, np.linalg.pinv(jacobians), strict=True)):
                 rates[k] -= inverse @ (jacobian @ rates[k])
         simulator.reset(poses, rates, current + nudge[:, 2 * n : 3 * n])
-        simulator.step(voltage + nudge[:, 3 * n :], settings.n_substeps)
+        simulator.advance(voltage + nudge[:, 3 * n :], steps)
         after = np.concatenate([simulator.q, simulator.q_dot, simulator.current], axis=-1)
         slope = ((after[:size] - after[size:]) / (2.0 * STEP)).T
         states.append(slope[:, : 3 * n])

@@ -1,4 +1,4 @@
-"""The one registry of players: who can play, in which environment, and what each is called and looks like."""
+"""Registry of the players: controllers with their environments, names, colours and markers."""
 
 from __future__ import annotations
 
@@ -19,12 +19,11 @@ from agents.tasks import POLICY_NAME, task_settings
 from elbow_gym.baselines.pd import CLIPPED, UNLIMITED, PDController
 from elbow_gym.baselines.policy import Policy, baseline_path, pair, read_policy
 from elbow_gym.baselines.tasks import registered_arguments, task_name
-from elbow_gym.simulation.options import TABLE_TIMESTEP
 from elbow_gym.task.settings import STARTS, Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 Maker = Callable[[ElbowArmVectorEnv], Controller]
-"""Gives a controller for an environment."""
+"""Function that makes a controller for an environment."""
 
 ELBOW_COUNTS = (2, 1, 0)
 """Elbow counts of the rigid table that players are compared at."""
@@ -62,7 +61,7 @@ class Player:
     """A controller with the environment it plays in."""
 
     name: str
-    """One name everywhere: on the command line, in tables and in files of results."""
+    """Name on the command line, in tables and in files of results."""
     task: str
     """Short name of the environment, as `agents.tasks.task_name` gives it."""
     settings: Settings
@@ -71,13 +70,13 @@ class Player:
     label: str
     """Name in figures and tables for readers."""
     colour: str
-    """#rrggbb."""
+    """Colour in figures, #rrggbb."""
     marker: str
-    """Matplotlib's letter."""
+    """Marker in figures, Matplotlib's letter."""
     seed: int | None = None
     """Seed of the training; None where nothing was trained."""
     effort: float = 1.0
-    """Time of a control period, times the PD's, for an honest time left; starting takes part of it."""
+    """Time of a control period, start included, as a multiple of the PD's [-], for the time left."""
     identity: str = ""
     """Digest of what the player is made of, beyond the code; empty where results must not be taken over."""
     starts_together: bool = False
@@ -93,7 +92,7 @@ def player_of(name: str, settings: Settings, make: Maker, **more: Any) -> Player
     """A player from any maker of a controller; colour and marker are those of `agents.style`, if it has the name.
 
     Args:
-        name: of the player.
+        name: name of the player.
         settings: arguments of the environment.
         make: gives the controller for an environment with these settings.
         more: further fields of `Player`.
@@ -114,7 +113,7 @@ class Entry(NamedTuple):
 
     @property
     def bearing(self) -> str:
-        """What the arm leans on: its number of elbows, or `TABLE`."""
+        """Support of the arm: its number of elbows, or `TABLE`."""
         return TABLE if self.env == TABLE_ENV else str(self.elbows)
 
     @property
@@ -142,7 +141,7 @@ class Entry(NamedTuple):
 
 
 def entries() -> list[Entry]:
-    """Everyone who plays: classical controllers, and what a file is there for; the compliant table's at the end.
+    """All entries: classical controllers, and those that a file is there for; the compliant table's at the end.
 
     Where a policy for the compliant table is shipped, the classical controllers with a supply of 24 V play there too.
     """
@@ -163,7 +162,7 @@ def entries() -> list[Entry]:
 def learned() -> dict[Entry, str]:
     """Shipped policies, without the seed in their names, by the entry that they play.
 
-    Who was trained on drawn arms and circles plays the paper's, under a name that ends in "_random".
+    A policy trained on drawn arms and circles plays the paper's, under a name that ends in "_random".
     """
     found: dict[Entry, str] = {}
     for group in sorted({policy.rpartition("_seed")[0] for policy in shipped_policies()}):
@@ -210,16 +209,9 @@ def find_player(name: str, elbows: int | None = None, env: str = "ElbowArm-v0") 
 def classical_player(name: str, elbows: int | None, env: str) -> Player:
     """One of `CLASSICAL` in a registered environment."""
     arguments, make, effort = CLASSICAL[name]
-    settings = settings_for(arguments, env, elbows)
+    settings = task_settings(env, elbows, arguments)
     more = {"task": task_name(env, elbows), "effort": effort, "identity": name, "starts_together": True}
     return player_of(name, settings, make, **more)
-
-
-def settings_for(arguments: Mapping[str, Any], env: str, elbows: int | None = None) -> Settings:
-    """A registered environment with a controller's own arguments; a table asks for shorter RK4 steps."""
-    table = registered_arguments(env).get("table", False) is not False
-    shorter = {"timestep": min(TABLE_TIMESTEP, arguments["timestep"])} if table and "timestep" in arguments else {}
-    return task_settings(env, elbows, {**arguments, **shorter})
 
 
 def optimal_trajectory(elbows: int, start: str) -> Path:
@@ -228,7 +220,7 @@ def optimal_trajectory(elbows: int, start: str) -> Path:
 
 
 def lqr_player(elbows: int) -> Player:
-    """The LQR around the optimal trajectory from the start that the environment has.
+    """Player of the LQR around the optimal trajectory from the environment's start.
 
     Raises:
         ValueError: no optimal trajectory is there for the elbow count.

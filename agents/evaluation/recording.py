@@ -65,7 +65,7 @@ def record(
         make_controller: gives the controller for the environment.
         seeds: one per episode.
         progress: called with the periods done and in all, a hundred times a run.
-        every: keeps the end of every so many control periods, a divisor of their number.
+        every: number of control periods between two recorded instants, a divisor of their number.
 
     Raises:
         ValueError: `every` does not divide the number of control periods.
@@ -93,7 +93,7 @@ def record_starts(
         make_controller: gives the controller for the environment with the arms of all starts.
         seeds: one per episode, the same for every start.
         progress: called with the periods done and in all, a hundred times a run.
-        every: keeps the end of every so many control periods, a divisor of their number.
+        every: number of control periods between two recorded instants, a divisor of their number.
 
     Returns:
         The recordings by start.

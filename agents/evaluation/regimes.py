@@ -1,4 +1,4 @@
-"""One controller in the regimes A, B and C: its metrics, and the report of them on the terminal."""
+"""Metrics of one player in the regimes A, B and C, and their report on the terminal."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHIFTED: dict[str, Any] = {
     "circle": {"radius": [0.05, 0.1], "period": [3.5, 7.0], "phase": "random"},
     "randomize": {"payload": [0.05, 0.2]},
 }
-"""What the shifted set changes in an environment. No training and no tuning has used it; controllers are told the
+"""Arguments of the environment in the shifted set. No training and no tuning has used it; controllers know the
 circle and not the payload. Larger circles are out of the paper PD's reach."""
 
 RECORDING_PERIOD = 0.001
@@ -40,7 +40,7 @@ def recordings(
     """A player's episodes from each start, side by side where it can, else one start after the other.
 
     Args:
-        player: who plays.
+        player: the player.
         starts: values of the environment's `start`.
         seeds: one per episode, the same for every start.
         progress: called with the control periods done and in all, of all starts together.
@@ -71,10 +71,10 @@ def in_all_regimes(
     Regimes with the same start share their episodes; a player that can takes all starts side by side.
 
     Args:
-        player: who plays.
+        player: the player.
         seeds: one per episode.
         progress: called with the control periods done and in all, of all starts together.
-        regimes: what is counted.
+        regimes: regimes to count.
     """
     starts = tuple(dict.fromkeys(regime.start for regime in regimes))
     played = recordings(player, starts, seeds, progress)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -93,13 +93,16 @@ def start_pose(arm: ArmParameters, lift: tuple[float, float]) -> Array:
 
 
 def play_on_table(
-    poses: Sequence[Array], friction: float, settings: Settings, progress: Callable[[int], Any] | None = None
+    poses: Sequence[Array],
+    table: Mapping[str, float],
+    settings: Settings,
+    progress: Callable[[int], Any] | None = None,
 ) -> TableRecording:
     """One run of the paper's PD per start pose, side by side, on the compliant table with no rigid elbow.
 
     Args:
         poses: start poses [rad], (n,) each, which the PD keeps on its idle joints.
-        friction: Coulomb's coefficient of the table [-].
+        table: fields of `TableParameters`.
         settings: circle, control frequency and duration; voltages are not limited.
         progress: called with the control periods done since its last call.
 
@@ -107,7 +110,8 @@ def play_on_table(
         ArithmeticError: the simulation left what float64 can represent.
     """
     arm, circle, period = settings.parsed_arm, settings.parsed_circle, settings.control_period
-    simulator = Simulator(arm, 0, len(poses), timestep=period, table={"friction": friction})
+    steps = replace(settings, table=table).substeps
+    simulator = Simulator(arm, 0, len(poses), timestep=float(steps.min()), table=table)
     time = np.arange(settings.horizon + 1) * period
     angle = circle.angle(time, 0.0)
     target, velocity = circle.position(angle), circle.velocity(angle)
@@ -124,7 +128,8 @@ def play_on_table(
         if k < settings.horizon:
             voltage = PAPER_KP * (q_d[k] - simulator.q) + PAPER_KD * (q_d_dot[k] - simulator.q_dot)
             largest = np.where(np.abs(voltage) > np.abs(largest), voltage, largest)
-            if simulator.advance(voltage, 1):
+            simulator.advance(voltage, steps)
+            if not simulator.valid.all():
                 raise ArithmeticError(f"the simulation left what float64 can represent at {time[k]:g} s")
         if progress is not None and k and k % 500 == 0:
             progress(500)

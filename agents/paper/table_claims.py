@@ -52,7 +52,7 @@ def reproduce_on_table(output: Path = Path("reproduction"), publish: bool = Fals
     with tqdm(total=len(FRICTIONS) * settings.horizon, bar_format=layout) as bar:
         for friction in FRICTIONS:
             bar.set_description(f"friction {friction:g}")
-            runs[friction] = play_on_table(poses, friction, settings, bar.update)
+            runs[friction] = play_on_table(poses, {"friction": friction}, settings, bar.update)
     cases = {friction: dict(zip(LIFTS, measure_on_table(run), strict=True)) for friction, run in runs.items()}
     text = table_markdown(cases)
     files = [

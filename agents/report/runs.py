@@ -28,7 +28,7 @@ class Run:
     controller: str
     """Name of the controller, as in the benchmark's tables."""
     bearing: str
-    """What the arm leans on: "2", "1" or "0" elbows, or `agents.evaluation.players.TABLE`."""
+    """Support of the arm: "2", "1" or "0" elbows, or `agents.evaluation.players.TABLE`."""
     start: str
     """Value of the environment's `start`."""
     series: Recording
@@ -62,7 +62,7 @@ def collect(entries: Sequence[Entry]) -> list[Run]:
 
 
 def play(entry: Entry, progress: Tell) -> list[Run]:
-    """An entry's runs from all starts; `progress` is told the units of work done since it was last told."""
+    """An entry's runs from all starts; `progress` gets the units of work done since its last call."""
     best = entry.player()
     exact = replace(best, settings=replace(best.settings, start_noise=0.0))
     paper = entry.name in PAPER_PD and entry.bearing != TABLE

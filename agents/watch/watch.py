@@ -24,7 +24,7 @@ WINDOW_RATE = 50.0
 HOLD = 2.0
 """Time for which a file shows its last picture [s]."""
 LABEL_HEIGHT = 30.0
-"""Of the label under a picture of 640 by 480 [pixels]."""
+"""Height of the label under a picture of 640 by 480 [pixels]."""
 
 
 def rgb(colour: str) -> Colour:
@@ -34,10 +34,10 @@ def rgb(colour: str) -> Colour:
 
 
 class Performance:
-    """One controller in an environment of its own, at its own control rate.
+    """Controller in its environment, at its control rate.
 
     Args:
-        name: of the player, as `find_player` takes it.
+        name: name of the player, as `find_player` takes it.
         env: id of the environment.
         elbows: elbows on the table; the environment's own number when None.
         start: the environment's `start`.
@@ -51,7 +51,7 @@ class Performance:
         self._viewer = Viewer(self._env.episodes, "rgb_array", *size, accent=rgb(player.colour))
         self._label = label(player.label, rgb(player.colour), size)
         self.duration = player.settings.duration
-        """Of an episode [s]."""
+        """Duration of an episode [s]."""
 
     def restart(self, seed: int) -> None:
         """Starts an episode."""

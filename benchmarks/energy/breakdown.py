@@ -42,9 +42,9 @@ class Motions(NamedTuple):
     """Energy by joint [J], (n,), of exact motions on the target."""
 
     papers: Array
-    """Idle joints in the paper's posture."""
+    """Energy by joint with the idle joints in the paper's posture [J], (n,)."""
     least: Array
-    """Idle joints in the posture of least copper loss at rest."""
+    """Energy by joint with the idle joints in the posture of least copper loss at rest [J], (n,)."""
 
 
 def exact_energy(settings: Settings, pose: ArrayLike) -> Array:

@@ -18,7 +18,7 @@ PARTS = {
 }
 """Parts of the benchmark and what they are."""
 FEATURED = ("lqr", "sac", "ppo", "computed_torque", "pd_gravity", "pd", "pd_paper")
-"""The seven controllers of the short table and the figure: the best known, what learns, and what an engineer builds."""
+"""Controllers of the short table and the figure: the best known, the learned, and the classical ones."""
 GAINS = (0.25, 0.5, 2.0, 4.0)
 """Factors of both gains of the paper's PD in the sweep beside it."""
 
@@ -36,7 +36,7 @@ class Cell:
 
     @property
     def entry(self) -> Entry:
-        """The registry's entry that plays it."""
+        """Entry of the registry that plays the cell."""
         nominal = Entry(self.controller, self.elbows)
         return nominal._replace(env=TABLE_ENV) if self.part == "table" else nominal
 

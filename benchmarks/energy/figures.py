@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from benchmarks.energy.rows import Row
 
 JOINTS_OF = ("pd", "pd_gravity", "computed_torque_posture", "lqr", "ppo", "sac")
-"""Whose joints are shown beside each other."""
+"""Controllers whose joints are shown side by side."""
 
 
 class Panel(NamedTuple):
@@ -36,7 +36,7 @@ PANELS = (
 )
 BEARING_MARKERS = {2: "o", 1: "s", 0: "^"}
 APART = 0.2
-"""Between the points of two elbow counts on a controller's line, whose spacing is 1."""
+"""Distance between the points of two elbow counts, as a multiple of that between two controllers [-]."""
 
 
 def figure(rows: Sequence[Row], path: Path) -> None:

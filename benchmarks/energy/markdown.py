@@ -88,7 +88,7 @@ def shown(row: Row) -> tuple[str, ...]:
 
 
 def with_interval(estimate: Estimate) -> str:
-    """A figure with its 95 % interval."""
+    """Estimate with its 95 % interval."""
     value, low, high = (significant(number, 4) for number in estimate)
     return f"{value} [{low}, {high}]"
 
@@ -141,7 +141,7 @@ def _pipes(lines: Sequence[tuple[str, ...]]) -> str:
 
 
 def write_rows(rows: Sequence[Row], path: Path) -> None:
-    """Writes every figure with its interval, and the energy of every joint."""
+    """Writes every metric with its interval, and the energy of every joint."""
     header = ["controller", "elbows", "regime"]
     header += [f"{name} [{unit}]{part}" for name, unit in UNITS.items() for part in ("", " low", " high")]
     joints = max(len(row.joint_energy) for row in rows)

@@ -1,4 +1,4 @@
-"""`python -m benchmarks energy`: every controller in every regime; a report on the terminal, tables and figures."""
+"""Run of the energy benchmark: every controller in every regime; a report on the terminal, tables and figures."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ from benchmarks.optimal import Cell as Bound
 from benchmarks.optimal import cached as cached_bound
 
 FEW = 3
-"""Start poses of a run that is not full. With both starts side by side they fit into one block of the kernel."""
+"""Start poses of a short run. With both starts side by side they fit into one block of the kernel."""
 LQR_ARMS = 80
-"""Arms that the LQR moves side by side to find its gains: all of a state's and the voltages' nudges, both ways."""
+"""Number of arms that the LQR moves side by side to find its gains: every state and voltage, up and down."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Plan:
 
 
 def plan(full: bool, episodes: int | None = None, **more: Any) -> Plan:
-    """The full benchmark or the short one, with so many start poses; `more` are further fields of `Plan`."""
+    """Plan of the full or the short benchmark with a number of start poses; `more` are further fields of `Plan`."""
     count = episodes if episodes is not None else len(BENCHMARK_SEEDS) if full else FEW
     if count < 1:
         raise ValueError(f"episodes must be positive, got {count}")

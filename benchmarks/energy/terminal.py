@@ -1,4 +1,4 @@
-"""The energy benchmark's report on the terminal: plain lines of at most 80 columns, and what they mean."""
+"""Report of the energy benchmark on the terminal: plain lines of at most 80 columns, and their meaning."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def meaning(rows: Sequence[Row]) -> str:
-    """What bracing and control change in the nominal part, in a sentence; empty where the players are missing."""
+    """Sentence on what bracing and control change in the nominal part; empty where the players are missing."""
     energies = {
         (controller, elbows): of["A"].figures["electrical_energy"].value
         for (elbows, controller), of in by_player(rows).items()
@@ -80,7 +80,7 @@ def meaning(rows: Sequence[Row]) -> str:
 
 
 def report(rows: Sequence[Row], poses: int, every_seed: bool, written: Sequence[Path]) -> str:
-    """Everything that the command prints in the end.
+    """Text that the command prints at its end.
 
     Args:
         rows: of all parts.
@@ -95,7 +95,7 @@ def report(rows: Sequence[Row], poses: int, every_seed: bool, written: Sequence[
             parts += [f"{part.capitalize()} part: {what}", table(chosen)]
     nominal = [row for row in rows if row.part == "nominal" and row.gain == 1.0]
     training = "all training seeds" if every_seed else "the best training seed"
-    figures = f"Each figure is the interquartile mean over {poses} start poses, of learned controllers with {training}."
+    figures = f"Each number is the interquartile mean over {poses} start poses, of learned controllers with {training}."
     regimes = "; ".join(f"{regime.name}: {regime.meaning}" for regime in REGIMES)
     gap = "Gap: excess over the least cost (minus the return) that optimal control has found."
     sentences = [

@@ -17,11 +17,10 @@ PAPER_KD = 20.0
 # Arguments of the environments that the PD acts in. Unclipped it peaks at 377 V, well within the limit.
 UNLIMITED: dict[str, Any] = {
     "control_frequency": 10_000.0,
-    "timestep": 1e-4,
     "voltage_limit": 1000.0,
     "action_unit": "volt",
 }
-CLIPPED: dict[str, Any] = {"control_frequency": 2000.0, "timestep": 5e-4, "voltage_limit": 24.0, "action_unit": "volt"}
+CLIPPED: dict[str, Any] = {"control_frequency": 2000.0, "voltage_limit": 24.0, "action_unit": "volt"}
 
 
 class PDController:

@@ -5,14 +5,14 @@
 import numpy as np
 
 from elbow_gym.kernel.rows import (
-    BELOW_TABLE, HAND, LARGEST_ANGLE, LOWEST, PARAMETER_ROWS, PLAIN_PARAMETER_ROWS, STATE_ROWS, SUMMARY_COLUMNS,
-    SWITCHED_STATE_ROWS, VALID,
+    BELOW_TABLE, HAND, LARGEST_ANGLE, LOWEST, PARAMETER_ROWS, PLAIN_PARAMETER_ROWS, RESIDUAL, STATE_ROWS,
+    SUMMARY_COLUMNS, SWITCHED_STATE_ROWS, VALID,
 )  # fmt: skip
 from elbow_gym.kernel.sine import sincos
 from elbow_gym.kernel.slots import (
-    AXIAL, BELOW, CONTACT_LOSS, COPPER, CURRENT, DRIVE, ELECTRICAL, FORCES, FRICTION, LENGTH, LOWEST_Z, PSI_DOT, Q,
-    Q_DOT, RHO, RUBBING, SHARED_ROWS, SPIN, STIFFNESS, STRIDE, SUPPLY_LOSS, TABLE, TEMPERATURE, U, VOLTAGE, W, WORK,
-    YAW_INERTIA, Z,
+    AXIAL, AZ, BELOW, CONTACT_LOSS, COPPER, CURRENT, DRIVE, ELECTRICAL, FORCES, FRICTION, LENGTH, LOWEST_Z, PSI_DOT, Q,
+    Q_DOT, RHO, RUBBING, SHARED_ROWS, SPIN, STIFFNESS, STRIDE, SUMZ, SUPPLY_LOSS, TABLE, TEMPERATURE, U, VOLTAGE, W,
+    WORK, YAW_INERTIA, Z,
 )  # fmt: skip
 from elbow_gym.kernel.template import template
 
@@ -33,22 +33,29 @@ def gather(ws, n, start, state, parameters, voltage):
     Reads: Q_DOT, AXIAL.
     Writes: ELECTRICAL, VOLTAGE, LENGTH, SPIN, YAW_INERTIA, LOWEST_Z, CONTACT_LOSS, STIFFNESS, PSI_DOT.
     """
-    for lane in range(W):
-        arm = min(start + lane, state.shape[0] - 1)
-        for a in range(n):
-            here = U(a * STRIDE + lane)
+    last = state.shape[0] - 1
+    for a in range(n):
+        here = U(a * STRIDE)
+        for row in range(3):
+            for lane in range(W):
+                ws[here + U(row * W + lane)] = state[min(start + lane, last), row, a]
+        for row in range(5):
+            for lane in range(W):
+                ws[here + ELECTRICAL + U(row * W + lane)] = state[min(start + lane, last), 3 + row, a]
+        for lane in range(W):
+            ws[here + VOLTAGE + U(lane)] = voltage[min(start + lane, last), a]
+        for row in range(PLAIN_PARAMETER_ROWS):
+            for lane in range(W):
+                ws[here + LENGTH + U(row * W + lane)] = parameters[min(start + lane, last), row, a]
+        if TABLE or RUBBING or DRIVE:
             for row in range(3):
-                ws[here + U(row * W)] = state[arm, row, a]
-            for row in range(5):
-                ws[here + ELECTRICAL + U(row * W)] = state[arm, 3 + row, a]
-            ws[here + VOLTAGE] = voltage[arm, a]
-            for row in range(PLAIN_PARAMETER_ROWS):
-                ws[here + LENGTH + U(row * W)] = parameters[arm, row, a]
-            if TABLE or RUBBING or DRIVE:
-                for row in range(3):
-                    ws[here + CONTACT_LOSS + U(row * W)] = state[arm, STATE_ROWS + row, a]
-                for row in range(PARAMETER_ROWS - PLAIN_PARAMETER_ROWS):
-                    ws[here + STIFFNESS + U(row * W)] = parameters[arm, PLAIN_PARAMETER_ROWS + row, a]
+                for lane in range(W):
+                    ws[here + CONTACT_LOSS + U(row * W + lane)] = state[min(start + lane, last), STATE_ROWS + row, a]
+            for row in range(PARAMETER_ROWS - PLAIN_PARAMETER_ROWS):
+                for lane in range(W):
+                    offset = STIFFNESS + U(row * W + lane)
+                    ws[here + offset] = parameters[min(start + lane, last), PLAIN_PARAMETER_ROWS + row, a]
+    for lane in range(W):
         k = U(lane)
         ws[SPIN + k] = ws[Q_DOT + k] * ws[Q_DOT + k]
         if TABLE:
@@ -61,8 +68,8 @@ def gather(ws, n, start, state, parameters, voltage):
 def scatter(ws, shared, n, lane, elbows, out, summary):
     """Writes a lane back; a state that cannot be represented stays as it was, with VALID at zero.
 
-    Reads: Q, Q_DOT, CURRENT, ELECTRICAL, COPPER, FRICTION, WORK, RHO, Z, LOWEST_Z, CONTACT_LOSS, TEMPERATURE,
-        SUPPLY_LOSS, FORCES, BELOW.
+    Reads: Q, Q_DOT, CURRENT, ELECTRICAL, COPPER, FRICTION, WORK, RHO, SUMZ, Z, LOWEST_Z, CONTACT_LOSS, TEMPERATURE,
+        SUPPLY_LOSS, AZ, FORCES, BELOW.
     """
     k = U(lane)
     valid = True
@@ -92,6 +99,9 @@ def scatter(ws, shared, n, lane, elbows, out, summary):
     summary[HAND + 2] = ws[end + Z]
     summary[LOWEST] = ws[end + LOWEST_Z]
     summary[BELOW_TABLE] += shared[BELOW + k]
+    summary[RESIDUAL] = 0.0
     for j in range(elbows.size):
+        elbow = U((elbows[j] - 2) * STRIDE + lane)
+        summary[RESIDUAL] = max(summary[RESIDUAL], abs(ws[elbow + AZ] + ws[elbow + SUMZ]))
         summary[SUMMARY_COLUMNS + j] = shared[FORCES + U(j * W) + k]
     return True

@@ -1,14 +1,14 @@
-"""Friction under rigid elbows, and elbow forces that agree with it."""
+"""Friction under rigid elbows, and elbow forces that agree with it: one fixed point, in the order of its steps."""
 
 # pyright: basic
 
 import numpy as np
 
 from elbow_gym.kernel.dense import cholesky_solve, gauss_solve
-from elbow_gym.kernel.rows import ELBOW_SPEED, MAXIMUM_ELBOWS
+from elbow_gym.kernel.rows import ELBOW_SPEED, LARGEST_AMPLIFICATION, MAXIMUM_ELBOWS
 from elbow_gym.kernel.slots import (
     C3, COUPLING, CR, CZ, D, ELBOW_FRICTION, ER, EZ, FORCES, FREE_RISE, IR3, IZ3, LANES, LOSS, MATRIX, NEXT, PUSH,
-    PUSHING, Q_DOT, R, RHO, RHO_DOT, ROTOR, SLIDE_R, SLIDE_T, STRIDE, TABLE, TWIST, U, W, X, Y,
+    PUSHING, PUSH_LIMIT, Q_DOT, R, RHO, RHO_DOT, ROTOR, SLIDE_R, SLIDE_T, STRIDE, TABLE, TWIST, U, W, X, Y,
 )  # fmt: skip
 from elbow_gym.kernel.template import template
 
@@ -76,13 +76,14 @@ def friction_coupling(ws, shared, lanes, elbows):
 def apply_friction(ws, shared, lanes, tip, elbows):
     """Puts the friction that was found on the arm and its loss on the meter; what is left to solve is the forces.
 
-    Reads: Q_DOT, RHO, RHO_DOT, TWIST, LOSS, R, X, FORCES, MATRIX, COUPLING, FREE_RISE, SLIDE_R, SLIDE_T, PUSH.
+    Reads: Q_DOT, RHO, RHO_DOT, TWIST, LOSS, R, X, FORCES, MATRIX, COUPLING, FREE_RISE, SLIDE_R, SLIDE_T, PUSH,
+        PUSH_LIMIT.
     Writes: TWIST, LOSS, R, FORCES, PUSH.
     """
     p = elbows.size
     for j in range(p):
         for k in range(lanes):
-            shared[PUSH + U(j * W) + k] = max(shared[FORCES + U(j * W) + k], 0.0)
+            shared[PUSH + U(j * W) + k] = min(max(shared[FORCES + U(j * W) + k], 0.0), shared[PUSH_LIMIT + k])
     for i in range(p):
         for k in range(lanes):
             shared[FORCES + U(i * W) + k] = shared[FREE_RISE + U(i * W) + k]
@@ -114,8 +115,8 @@ def friction_fixed_point(ws, shared, n, elbows):
     Friction enters the columns of the active elbows, at first those that push without friction, then those that push
     with it, until they stay the same; the friction found is then held, so that it opposes the sliding in any case.
 
-    Reads: FORCES, PUSHING.
-    Writes: TWIST, PUSHING.
+    Reads: FORCES, PUSHING, PUSH_LIMIT.
+    Writes: TWIST, PUSHING, PUSH_LIMIT.
     """
     lanes = min(LANES, U(ws.size))
     p = elbows.size
@@ -125,6 +126,12 @@ def friction_fixed_point(ws, shared, n, elbows):
             ws[tip + TWIST + k] = 0.0
     friction_coupling(ws, shared, lanes, elbows)
     cholesky_solve(shared, lanes, p)
+    for k in range(lanes):
+        shared[PUSH_LIMIT + k] = 0.0
+    for j in range(p):
+        for k in range(lanes):
+            force = LARGEST_AMPLIFICATION * abs(shared[FORCES + U(j * W) + k])
+            shared[PUSH_LIMIT + k] = max(shared[PUSH_LIMIT + k], force)
     for _ in range(p + 2):
         for j in range(p):
             for k in range(lanes):

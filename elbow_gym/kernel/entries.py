@@ -1,58 +1,59 @@
-"""What Python calls: a run, accelerations at a state, poses laid onto the table."""
+"""Entries beside runs: the summary of a state, accelerations, and poses on the elbows' plane."""
 
 # pyright: basic
 
+import numpy as np
+
+from elbow_gym.kernel.acceleration import accelerate
 from elbow_gym.kernel.block import gather, scatter, workspace
-from elbow_gym.kernel.integration import evaluate, first_stage, rk4_step
+from elbow_gym.kernel.integration import evaluate
 from elbow_gym.kernel.projection import project
-from elbow_gym.kernel.slots import BELOW, CURRENT_SUM, FORCES, LANES, LENGTH, Q, Q_DOT_SUM, STRIDE, U, W
+from elbow_gym.kernel.slots import (
+    BELOW, CURRENT, DRIVE, FORCES, INVERSE_L, LANES, LENGTH, NET, Q, Q_DDOT, RESISTANCE, STRIDE, TEMPERATURE, U, W,
+    WARMING,
+)  # fmt: skip
 from elbow_gym.kernel.template import template
 
 
 @template(entry=True)
-def advance(state, parameters, voltage, elbows, first, end, n_steps, step, summary):
-    """Arms first..end-1 of the batch, n_steps RK4 steps of `step` seconds under constant voltage, in place.
-
-    state (B, STATE_ROWS, n), parameters (B, PARAMETER_ROWS, n), voltage (B, n), summary (B, SUMMARY_COLUMNS + p).
-    With n_steps = 0 only the summary is refreshed. An arm whose state leaves the representable keeps its old
-    state and summary, with VALID at zero. Returns the number of such arms.
+def refresh(state, parameters, elbows, summary, first, end):
+    """Summary of arms first..end-1 at their present state, with no step taken.
 
     Writes: BELOW.
     """
-    invalid = 0
     n = state.shape[2]
     ws, shared = workspace(n)
-    tip = U((n - 1) * STRIDE)
+    voltage = np.zeros((state.shape[0], n))
     for start in range(first, end, W):
         gather(ws, n, start, state[:end], parameters, voltage)
         for k in range(LANES):
             shared[BELOW + k] = 0.0
         evaluate(ws, shared, n, elbows)
-        for _ in range(n_steps):
-            rk4_step(ws, shared, n, tip, elbows, step)
+        accelerate(ws, n, 0.0)
         for lane in range(min(W, end - start)):
-            if not scatter(ws, shared, n, lane, elbows, state[start + lane], summary[start + lane]):
-                invalid += 1
-    return invalid
+            scatter(ws, shared, n, lane, elbows, state[start + lane], summary[start + lane])
 
 
 @template(entry=True)
 def accelerations(state, parameters, voltage, elbows, q_ddot, current_dot, elbow_force):
     """Right-hand side of eq. 17 at each arm's state: q_ddot and current_dot (B, n), elbow_force (B, p).
 
-    Reads: Q_DOT_SUM, CURRENT_SUM, FORCES.
+    Reads: CURRENT, RESISTANCE, INVERSE_L, Q_DDOT, NET, TEMPERATURE, WARMING, FORCES.
     """
     n = state.shape[2]
     ws, shared = workspace(n)
     for start in range(0, state.shape[0], W):
         gather(ws, n, start, state, parameters, voltage)
         evaluate(ws, shared, n, elbows)
-        # The increments of a step of one second are the rates.
-        first_stage(ws, n, 1.0, 0.0)
+        accelerate(ws, n, 0.0)
         for lane in range(min(W, state.shape[0] - start)):
             for a in range(n):
-                q_ddot[start + lane, a] = ws[U(a * STRIDE + lane) + Q_DOT_SUM]
-                current_dot[start + lane, a] = ws[U(a * STRIDE + lane) + CURRENT_SUM]
+                here = U(a * STRIDE + lane)
+                resistance = ws[here + RESISTANCE]
+                if DRIVE:
+                    resistance *= 1.0 + ws[here + WARMING] * ws[here + TEMPERATURE]
+                q_ddot[start + lane, a] = ws[here + Q_DDOT]
+                current_dot[start + lane, a] = (ws[here + NET] - resistance * ws[here + CURRENT]) * ws[here + INVERSE_L]
             for j in range(elbows.size):
                 elbow_force[start + lane, j] = shared[FORCES + U(j * W + lane)]
 

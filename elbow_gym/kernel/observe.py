@@ -1,4 +1,4 @@
-"""Voltages of actions, points of paths, observations and rewards of a batch.
+"""Observations, rewards and points of paths of a batch of arms.
 
 Compiled, so that an arm's bits do not depend on how many others there are.
 """
@@ -11,9 +11,10 @@ import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
-from elbow_gym.kernel.rows import BELOW_TABLE, HAND
+from elbow_gym.kernel import reward as plain
+from elbow_gym.kernel.rows import BELOW_TABLE, HAND, METERED
 from elbow_gym.kernel.sine import sincos
-from elbow_gym.kernel.template import compiled, compiled_entry
+from elbow_gym.kernel.template import compiled, compiled_entry, renamed
 
 _sincos = compiled(sincos)
 
@@ -28,10 +29,13 @@ def _multiply_and_add(context, a, b, c):
 _rounded_once: Any = intrinsic(_multiply_and_add)
 
 
-@compiled
-def fused(a, b, c):
-    """A b + c of floats, rounded once."""
+def _fused(a, b, c):
     return _rounded_once(a, b, c)
+
+
+_reward = compiled(
+    renamed(plain.reward, {"fused": compiled(_fused) if hasattr(_sincos, "py_func") else plain.fused}, "reward")
+)
 
 
 @compiled
@@ -46,21 +50,6 @@ def _path_point(coefficients, c, s, out):
 
 
 @compiled_entry
-def drive(action, highest, volts, voltage):
-    """Fills voltage (B, n) with the clipped action (B, n) in volts. False when an action is not a number.
-
-    highest (B,) is each arm's largest action, volts (B,) what a unit of it is.
-    """
-    numbers = True
-    for b in range(action.shape[0]):
-        for a in range(action.shape[1]):
-            value = action[b, a]
-            numbers = numbers and not np.isnan(value)
-            voltage[b, a] = min(max(value, -highest[b]), highest[b]) * volts[b]
-    return numbers
-
-
-@compiled_entry
 def path(coefficients, angle, out):
     """Points out (m, 3) of a closed path at angles (m,): a Fourier series, rows 1, cos, sin, cos 2, sin 2..."""
     for i in range(angle.size):
@@ -68,46 +57,69 @@ def path(coefficients, angle, out):
         _path_point(coefficients, c, s, out[i])
 
 
+@compiled
+def _scaled(value, scale, high):
+    return min(max(np.float32(value / scale), -high), high)
+
+
 @compiled_entry
 def observe(
-    state, summary, pose, coefficients, angle, lookahead, scale, high, price, spent, observation, figures, first, end
-):
+    state, summary, pose, coefficients, phase, turn, periods, lookahead, starts, scale, high, price, spent,
+    observation, figures, first, end,
+):  # fmt: skip
     """Fills observation (B, size) float32 and the rows FIGURES of figures, (9, B), for arms first..end-1.
 
-    coefficients (B, rows, 3) and angle (B,) are each arm's path and where the target stands on it, lookahead (B,) the
-    angle to what it looks ahead to. price is the tracking weight [1/m], the energy weight [1/W], the control frequency
-    [Hz] and whether negative power counts; spent (B,) is the energy paid before [J], and is brought up to date.
-    In compiled code so that an arm's bits do not depend on how many others there are.
+    Args:
+        state: the arms' state rows, (B, rows, n).
+        summary: the arms' summary, (B, columns).
+        pose: what joint angles are counted from [rad], (n,).
+        coefficients: each arm's path as Fourier rows [m], (B, rows, 3).
+        phase: where the target was on it at the reset [rad], (B,).
+        turn: how far it turns in a control period [rad], (B,).
+        periods: control periods since the reset, (B,).
+        lookahead: angle from there to the look-ahead target [rad], (B,).
+        starts: first entry of each of FEATURES in an observation, (7,).
+        scale: quantity per unit of each entry, (size,).
+        high: upper bounds of the entries, (size,).
+        price: tracking weight [1/m], energy weight [1/W], control frequency [Hz], whether negative power counts.
+        spent: energy paid so far [J], (B,), brought up to date.
+        observation: filled.
+        figures: filled.
+        first: first arm.
+        end: arm after the last.
     """
     n = state.shape[2]
     later = np.empty(3)
     target = np.empty(3)
     tracking_weight, energy_weight, frequency, regeneration = price
     for b in range(first, end):
-        s, c = _sincos(angle[b])
+        angle = phase[b] + turn[b] * periods[b]
+        s, c = _sincos(angle)
         _path_point(coefficients[b], c, s, target)
-        s_later, c_later = _sincos(angle[b] + lookahead[b])
+        s_later, c_later = _sincos(angle + lookahead[b])
         _path_point(coefficients[b], c_later, s_later, later)
+        for a in range(n):
+            m = starts[0] + a
+            observation[b, m] = _scaled(state[b, 0, a] - pose[a], scale[m], high[m])
+            m = starts[1] + a
+            observation[b, m] = _scaled(state[b, 1, a], scale[m], high[m])
+            m = starts[2] + a
+            observation[b, m] = _scaled(state[b, 2, a], scale[m], high[m])
         squared = 0.0
-        for m in range(3 * n + 11):
-            axis = (m - 3 * n) % 3
-            if m < n:
-                value = state[b, 0, m] - pose[m]
-            elif m < 2 * n:
-                value = state[b, 1, m - n]
-            elif m < 3 * n:
-                value = state[b, 2, m - 2 * n]
-            elif m < 3 * n + 3:
-                value = summary[b, HAND + axis] - target[axis]
-                squared += value * value
-            elif m < 3 * n + 6:
-                value = summary[b, HAND + axis] - coefficients[b, 0, axis]
-            elif m < 3 * n + 9:
-                value = summary[b, HAND + axis] - later[axis]
-            else:
-                value = c if m == 3 * n + 9 else s
-            observation[b, m] = min(max(np.float32(value / scale[m]), -high[m]), high[m])
-        for row, meter in ((2, 3), (3, 4), (4, 7)):
+        for axis in range(3):
+            hand = summary[b, HAND + axis]
+            error = hand - target[axis]
+            squared += error * error
+            m = starts[3] + axis
+            observation[b, m] = _scaled(error, scale[m], high[m])
+            m = starts[4] + axis
+            observation[b, m] = _scaled(hand - coefficients[b, 0, axis], scale[m], high[m])
+            m = starts[5] + axis
+            observation[b, m] = _scaled(hand - later[axis], scale[m], high[m])
+        m = starts[6]
+        observation[b, m] = _scaled(c, scale[m], high[m])
+        observation[b, m + 1] = _scaled(s, scale[m + 1], high[m + 1])
+        for row, meter in METERED:
             total = 0.0
             for a in range(n):
                 total += state[b, meter, a]
@@ -115,8 +127,8 @@ def observe(
         paid = figures[2, b] if regeneration else figures[3, b]
         figures[0, b] = np.sqrt(squared)
         figures[1, b] = (paid - spent[b]) * frequency
-        figures[5, b] = 0.0 - tracking_weight * figures[0, b]
-        figures[6, b] = 0.0 - energy_weight * figures[1, b]
+        figures[5, b], figures[6, b], figures[8, b] = _reward(
+            figures[0, b], figures[1, b], tracking_weight, energy_weight
+        )
         figures[7, b] = summary[b, BELOW_TABLE]
-        figures[8, b] = fused(-figures[1, b], energy_weight, figures[5, b])
         spent[b] = paid

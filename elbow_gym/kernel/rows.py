@@ -39,8 +39,9 @@ PARAMETERS = (
 PLAIN_PARAMETER_ROWS = 13
 PARAMETER_ROWS = len(PARAMETERS)
 # Columns of the per-arm summary (B, SUMMARY_COLUMNS + p): hand position, lowest joint or hand height, seconds spent
-# below the table (accumulated), 1 while the state is representable, then one force per elbow.
-HAND, LOWEST, BELOW_TABLE, VALID, SUMMARY_COLUMNS = 0, 3, 4, 5, 6
+# below the table (accumulated), 1 while the state is representable, the largest vertical acceleration that an elbow has
+# in spite of its force [m/s^2], then one force per elbow.
+HAND, LOWEST, BELOW_TABLE, VALID, RESIDUAL, SUMMARY_COLUMNS = 0, 3, 4, 5, 6, 7
 # Rows that `observe` fills beside the observation.
 FIGURES = (
     "tracking_error",
@@ -53,6 +54,8 @@ FIGURES = (
     "below_table",
     "reward",
 )
+# Figures that are sums over the joints, with their row of STATE.
+METERED = ((2, 3), (3, 4), (4, 7))
 # Beyond this angle [rad] the sine loses digits; an arm gets there only by blowing up.
 LARGEST_ANGLE = 1e5
 # Elbows rest at z = 0 to 1e-8 m; lower than this is under the table.
@@ -63,6 +66,9 @@ CONTACT_TOLERANCE = 1e-3
 ELBOW_SPEED = 0.01
 GEAR_SPEED = 0.05
 MAXIMUM_ELBOWS = 8
+# Friction of a rigid elbow goes with its force up to this many times the largest force without friction: near a pose in
+# which elbow and friction jam, Coulomb's law has no solution, or one without bound.
+LARGEST_AMPLIFICATION = 10.0
 # A projection onto the table is repeated while it turns a link by more than this [rad per m of it], so often at most.
 SMALL_SHIFT = 1e-7
 NEWTON_STEPS = 30

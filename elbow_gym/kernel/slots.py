@@ -20,6 +20,8 @@ W = BLOCK_LANES  # length of a row
 LANES = U(W)
 # What a kernel is made for: a compliant table, friction on rigid elbows, motors with more than the paper's losses.
 TABLE, RUBBING, DRIVE = False, False, False
+# Whether the currents' own decay is exact, or takes the classical stages as all else does.
+EXPONENTIAL = False
 LOWEST_FREE = BELOW_TABLE_TOLERANCE
 
 MEANINGS: list[str] = []
@@ -40,7 +42,7 @@ Q0 = slot("q at the start of the RK4 step [rad]")
 Q_DOT0 = slot("q_dot at the start of the RK4 step [rad/s]")
 CURRENT0 = slot("i at the start of the RK4 step [A]")
 Q_DOT_SUM = slot("weighted sum of the stages' q_ddot so far [rad/s]")
-CURRENT_SUM = slot("weighted sum of the stages' i_dot so far [A]")
+CURRENT_SUM = slot("RK4: weighted sum of the stages' i_dot so far; exponential: i of stage 2 [A]")
 ELECTRICAL = slot("electrical energy, integral of v i [J]")
 DRAWN = slot("drawn energy, integral of max(v i, 0) [J]")
 COPPER = slot("copper loss, integral of R i^2 [J]")
@@ -89,6 +91,21 @@ B3 = slot("articulated bias b, torque [N m]")
 # Of the elbow pass.
 FREE = slot("vertical acceleration of the elbow without elbow forces, summed so far [m/s^2]")
 GAIN = slot("vertical acceleration of the elbow for a newton on it, summed so far [1/kg]")
+Q_DDOT = slot("relative joint acceleration [rad/s^2]")
+NET = slot("net voltage N = v - K_m q_dot [V]")
+# Of exponential steps: what the current is made of, and what the stages keep.
+DECAY = slot("e^-z with z = h R / L [-]")
+HALF_DECAY = slot("e^(-z/2) [-]")
+HALF_GAIN = slot("current after half a step for a volt [A/V]")
+END_0 = slot("current after the step for a volt at its start [A/V]")
+END_MID = slot("current after the step for a volt at its middle [A/V]")
+END_1 = slot("current after the step for a volt at its end [A/V]")
+MEAN_DECAY = slot("mean current over the step for an ampere at its start [-]")
+MEAN_0 = slot("mean current over the step for a volt at its start [A/V]")
+MEAN_MID = slot("mean current over the step for a volt at its middle [A/V]")
+MEAN_1 = slot("mean current over the step for a volt at its end [A/V]")
+NET_0 = slot("net voltage N at the start of the step [V]")
+NET_MID = slot("net voltage N at its middle, of the stages so far [V]")
 SLOTS = len(MEANINGS)
 # From here on only in kernels with a switch on; states and parameters first, in the order of rows.py.
 CONTACT_LOSS = slot("energy lost in contacts [J]")
@@ -117,6 +134,7 @@ BUS = slot("power asked of the supply, summed so far [W]")
 SHARE = slot("voltage of the supply over its nominal one [-]")
 TEMPERATURE0 = slot("temperature rise at the start of the RK4 step [K]")
 TEMPERATURE_SUM = slot("weighted sum of the stages' temperature rates so far [K]")
+START_R = slot("armature resistance at the start of an exponential step [ohm]")
 SWITCHED_SLOTS = len(MEANINGS) - SLOTS
 
 # Quantities that take over the row of another, which no later pass reads.
@@ -158,10 +176,13 @@ SLIDE_R = FREE_RISE + U(W * MAXIMUM_ELBOWS)
 SLIDE_T = SLIDE_R + U(W * MAXIMUM_ELBOWS)
 PUSHING = SLIDE_T + U(W * MAXIMUM_ELBOWS)
 PUSH = PUSHING + U(W * MAXIMUM_ELBOWS)
-SHARED_ROWS = W * (3 * _MATRIX + 6 * MAXIMUM_ELBOWS + 3)
+PUSH_LIMIT = PUSH + U(W * MAXIMUM_ELBOWS)  # the largest push that friction goes with [N]
+SHARED_ROWS = W * (3 * _MATRIX + 6 * MAXIMUM_ELBOWS + 4)
 
 
-def offsets(lanes: int, *, table: bool, rubbing: bool, drive: bool, reuse: bool = True) -> dict[str, Any]:
+def offsets(
+    lanes: int, *, table: bool, rubbing: bool, drive: bool, exponential: bool = True, reuse: bool = True
+) -> dict[str, Any]:
     """Names of this file as a kernel knows them.
 
     Args:
@@ -169,6 +190,7 @@ def offsets(lanes: int, *, table: bool, rubbing: bool, drive: bool, reuse: bool 
         table: with a compliant table.
         rubbing: with friction on rigid elbows.
         drive: with gear friction, warm windings and a supply that sags.
+        exponential: with exact decay of the currents.
         reuse: False gives each quantity of `REUSED` a row of its own, which a test compares with.
     """
     known: dict[str, Any] = {
@@ -180,7 +202,7 @@ def offsets(lanes: int, *, table: bool, rubbing: bool, drive: bool, reuse: bool 
         rows += len(REUSED)
     stride = lanes * (rows + MAXIMUM_ELBOWS * (2 if rubbing else 1) + 1)
     known.update(W=lanes, U=U, Y=lanes * rows, X=lanes * (rows + MAXIMUM_ELBOWS), STRIDE=stride, NEXT=U(stride))
-    known.update(TABLE=table, RUBBING=rubbing, DRIVE=drive)
+    known.update(TABLE=table, RUBBING=rubbing, DRIVE=drive, EXPONENTIAL=exponential)
     known.update(LOWEST_FREE=CONTACT_TOLERANCE if table else BELOW_TABLE_TOLERANCE)
     known.update(SHARED_ROWS=(SHARED_ROWS if rubbing else PLAIN_SHARED_ROWS) * lanes // W)
     return known

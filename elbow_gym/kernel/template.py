@@ -18,7 +18,9 @@ class Template(NamedTuple):
 
     function: Any
     inlined: bool
-    """Into every caller."""
+    """Into every caller, by the compiler's back end."""
+    flat: bool
+    """Written into every caller before it is compiled: nested functions would be optimised once a level."""
     entry: bool
     """Called from Python, and cached on disk with all that it calls."""
 
@@ -27,26 +29,30 @@ TEMPLATES: dict[str, Template] = {}
 """Every template by its name."""
 
 
-def template(function: Any = None, *, inlined: bool = False, entry: bool = False) -> Any:
+def template(function: Any = None, *, inlined: bool = False, flat: bool = False, entry: bool = False) -> Any:
     """Decorator that marks a function as a template, and leaves the function itself as it is.
 
     Args:
         function: the function; None where the decorator has arguments.
-        inlined: compile it into every caller.
+        inlined: compile it into every caller, for a body of a loop over lanes.
+        flat: write it into its caller, for a sequence of passes that one place calls.
         entry: Python calls it; it is cached on disk.
     """
     if function is None:
-        return partial(template, inlined=inlined, entry=entry)
-    TEMPLATES[function.__name__] = Template(function, inlined, entry)
+        return partial(template, inlined=inlined, flat=flat, entry=entry)
+    TEMPLATES[function.__name__] = Template(function, inlined, flat, entry)
     return function
 
 
-def compiled(function: Any, *, cached: bool = False, inlined: bool = False) -> Any:
+def compiled(function: Any, *, cached: bool = False, inlined: bool = False, flat: bool = False) -> Any:
     """The compiled function, without a cache on disk where no folder can be written."""
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": inlined}
+    if flat:
+        options["inline"] = "always"
     try:
-        return njit(nogil=True, error_model="numpy", cache=cached, forceinline=inlined)(function)
+        return njit(cache=cached, **options)(function)
     except RuntimeError:
-        return njit(nogil=True, error_model="numpy", forceinline=inlined)(function)
+        return njit(**options)(function)
 
 
 def compiled_entry(function: Any) -> Any:
@@ -82,7 +88,7 @@ def instances(known: dict[str, Any], suffix: str, compile_with: Entry = compiled
     space.update(known)
     for name, each in TEMPLATES.items():
         copy = renamed(each.function, space, f"{name}_{suffix}")
-        space[name] = compile_with(copy, cached=each.entry, inlined=each.inlined)
+        space[name] = compile_with(copy, cached=each.entry, inlined=each.inlined, flat=each.flat)
     return {name: space[name] for name, each in TEMPLATES.items() if each.entry}
 
 

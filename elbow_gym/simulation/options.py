@@ -5,17 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from elbow_gym.checks import non_negative, positive
-from elbow_gym.motors import COULOMB_VELOCITY
 from elbow_gym.parameters import ArmParameters
 from elbow_gym.table import TableParameters, as_table
-
-# Contact on a table of the default stiffness wants RK4 steps no longer than this [s].
-TABLE_TIMESTEP = 0.001
-# Explicit RK4 is stable up to 2.785 / rate; fastest are the armature, at R / L, and a gear near standstill.
-STABILITY_LIMIT = 2.7
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,19 +47,3 @@ class Conditions:
         """Whether motors or supply go beyond the paper's."""
         rough = bool((arm.of_motors("gear_coulomb_friction") > 0.0).any())
         return self.heat or self.supply_resistance > 0.0 or rough
-
-    def longest_timestep(self, arm: ArmParameters) -> tuple[float, str]:
-        """The longest stable RK4 step [s] and what sets it."""
-        resistance, inductance = arm.of_motors("armature_resistance"), arm.of_motors("armature_inductance")
-        limits = {"L / R": STABILITY_LIMIT / float((resistance / inductance).max())}
-        coulomb = arm.of_motors("reflected_coulomb_friction")
-        if coulomb.any():
-            # Near standstill it adds to viscous friction; the rotor's is the least inertia that a joint can have.
-            viscous = np.array(arm.joint_viscous_friction) + arm.of_motors("reflected_viscous_friction")
-            rates = (coulomb / COULOMB_VELOCITY + viscous) / arm.of_motors("reflected_inertia")
-            limits["gear_coulomb_friction"] = STABILITY_LIMIT / float(rates[coulomb > 0.0].max())
-        if self.surface is not None:
-            softer = TableParameters().stiffness / self.surface.stiffness
-            limits["the table"] = TABLE_TIMESTEP * min(1.0, softer**0.5)
-        reason = min(limits, key=limits.__getitem__)
-        return limits[reason], reason

@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym.kernel.rows import BELOW_TABLE, HAND, LOWEST, STATE_ROWS, SUMMARY_COLUMNS, SWITCHED_STATE, VALID
+from elbow_gym.kernel.rows import (
+    BELOW_TABLE,
+    HAND,
+    LOWEST,
+    RESIDUAL,
+    STATE_ROWS,
+    SUMMARY_COLUMNS,
+    SWITCHED_STATE,
+    VALID,
+)
 from elbow_gym.parameters import Array
 
 
@@ -88,6 +97,14 @@ class Readings:
     def valid(self) -> NDArray[np.bool_]:
         """False where the last step left what float64 can represent (the state is then the one before), (B,)."""
         return self._summary[:, VALID] > 0.0
+
+    @property
+    def constraint_residual(self) -> Array:
+        """Largest vertical acceleration of an elbow in spite of its force [m/s^2], (B,); zero to rounding.
+
+        Where the elbows' matrix is singular, as when two elbows cannot move against each other, it is larger.
+        """
+        return self._columns(RESIDUAL, RESIDUAL + 1)[:, 0]
 
     @property
     def elbow_force(self) -> Array:

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym.kernel import observe
 from elbow_gym.parameters import Array
 from elbow_gym.task.arm_batch import Population
 from elbow_gym.task.settings import Settings
@@ -28,7 +27,9 @@ class Actuation:
         self._longest_delay = int(settings.randomization.highest("action_delay"))
         self.queue = np.zeros((num_envs, self._longest_delay + 1, settings.parsed_arm.n_joints))
         """Voltages asked for, newest first [V], (B, 1 + longest delay, n)."""
-        self._one = np.ones(num_envs)
+        self._supply, self._one = np.ones(num_envs), np.ones(num_envs)
+        self._late = np.zeros(num_envs, dtype=np.int64)
+        self.take_values()
 
     def check(self, values: Mapping[str, Array]) -> None:
         """Raises ValueError when an arm's actions would be later than observations make room for."""
@@ -41,20 +42,17 @@ class Actuation:
     def reset(self, chosen: NDArray[np.int64]) -> None:
         """The chosen arms start without voltages on their way."""
         self.queue[chosen] = 0.0
+        self.take_values()
 
-    def voltage(self, action: Array) -> Array:
-        """Terminal voltages that arrive at the motors this control period [V], (B, n).
+    def take_values(self) -> None:
+        """Supply voltages and delays are as the arms' values say from now on."""
+        self._supply[:] = self._population.values["supply_voltage"]
+        self._late[:] = self._population.values["action_delay"]
 
-        Raises ValueError when an action is not a number, with nothing changed.
+    def arguments(self) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+        """What the kernel makes volts of actions with: largest action, volts per unit of action, queue and delays.
+
+        The arrays are this object's own and are brought up to date in place.
         """
-        supply = self._population.values["supply_voltage"]
-        highest, volts = (self._one, supply) if self._fraction else (supply, self._one)
-        asked = np.empty_like(action)
-        if not observe.drive(action, highest, volts, asked):
-            raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
-        if not self._longest_delay:
-            return asked
-        self.queue[:, 1:] = self.queue[:, :-1].copy()
-        self.queue[:, 0] = asked
-        late = self._population.values["action_delay"].astype(np.int64)
-        return self.queue[np.arange(len(late)), late]
+        scales = (self._one, self._supply) if self._fraction else (self._supply, self._one)
+        return (*scales, self.queue, self._late)

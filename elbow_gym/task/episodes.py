@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple, cast
 
@@ -10,15 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from elbow_gym.checks import check_entries, check_restorable, require_entries, restore
-from elbow_gym.kernel.rows import FIGURES
+from elbow_gym.kernel import observe
+from elbow_gym.kernel.rows import FIGURES, RESIDUAL, SUMMARY_COLUMNS
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.parameters import Array
+from elbow_gym.simulation.step_limit import check_parameters, rates
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.actuation import Actuation
 from elbow_gym.task.arm_batch import Population
 from elbow_gym.task.circle import Circle, check_reachable
 from elbow_gym.task.reward import Price, early_end
-from elbow_gym.task.sensing import Sensing, Sight, looking
+from elbow_gym.task.sensing import Sensing, Sight, blank
 from elbow_gym.task.settings import Settings
 from elbow_gym.task.targets import Targets
 
@@ -57,10 +59,12 @@ class Episodes:
             self.arm,
             settings.elbow_joints,
             num_envs,
-            timestep=settings.control_period / settings.n_substeps,
+            timestep=float(settings.substeps.min()),
+            integrator=settings.integrator,
             num_threads=num_threads,
             **{field.name: getattr(conditions, field.name) for field in fields(conditions)},
         )
+        self.simulator.period = settings.control_period
         self.num_envs = num_envs
         self.tracking_weight = float(settings.tracking_weight)
         self.energy_weight = float(settings.energy_weight)
@@ -71,11 +75,17 @@ class Episodes:
         self.actuation = Actuation(settings, self.population, num_envs)
         self.sensing = Sensing(settings, self.simulator, self.population, self.actuation.queue)
         self.layout = self.sensing.layout
-        self._n_substeps, self._horizon = settings.n_substeps, settings.horizon
+        self._substeps, self._horizon = settings.substeps, settings.horizon
         if settings.start == "on_target" and not self.circle.random:
             inverse_kinematics(self.arm, self.pose, self.circle.position(np.linspace(0.0, 2.0 * np.pi, 73)))
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._spent = np.zeros(num_envs)
+        # Arrays that every control period reads and resets bring up to date in place.
+        self._actuated = self.actuation.arguments()
+        layout, self._size = self.layout, self.layout.size
+        self._observed = (
+            self.pose, *self.targets.arguments(self._steps), layout.starts, layout.scale, layout.high,
+        )  # fmt: skip
 
     @property
     def highest_action(self) -> float:
@@ -137,6 +147,10 @@ class Episodes:
         values = self.population.draw(generators, given)
         self.actuation.check(values)
         rows = self.population.put(chosen, values)
+        if given is not None:
+            settings = self.settings
+            found = rates(rows, settings.conditions, values["supply_voltage"], elbows=bool(settings.elbow_joints))
+            check_parameters(float(self._substeps.max()), found, settings.integrator)
         if given is not None and "length" in given:
             for arm in self.population.arms(chosen):
                 check_reachable(arm, self.settings.elbow_joints, self.circle)
@@ -175,18 +189,22 @@ class Episodes:
 
         Raises ValueError, with the state untouched, when an action is not a number.
         """
-        voltage = self.actuation.voltage(action)
-        self._steps += 1
         settings = self.settings
-        price = Price(self.tracking_weight, self.energy_weight, settings.control_frequency, settings.regeneration)
-        sight, look = self._looking(price)
-        invalid = self.simulator.advance(voltage, self._n_substeps, look)
+        price = (self.tracking_weight, self.energy_weight, settings.control_frequency, settings.regeneration)
+        sight, voltage = blank(self.num_envs, self._size), np.empty_like(action)
+        self._steps += 1
+        invalid = self.simulator.control_step(
+            (action, voltage, *self._actuated), self._substeps, (*self._observed, price, self._spent, *sight)
+        )
+        if invalid < 0:
+            self._steps -= 1
+            raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
         self.sensing.complete(sight.observation, waiting)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
         truncated = self._steps >= self._horizon
         if invalid:
             terminated = ~self.simulator.valid
-            self._charge_the_rest(terminated, sight, price)
+            self._charge_the_rest(terminated, sight, Price(*price))
             truncated &= ~terminated
         info = self.info(sight, voltage)
         return Outcome(sight.observation, sight.figure("reward"), terminated, truncated, info)
@@ -194,7 +212,9 @@ class Episodes:
     def _charge_the_rest(self, terminated: NDArray[np.bool_], sight: Sight, price: Price) -> None:
         """Puts the worst reward for the remaining time, this step included, in place of the terminated arms'."""
         rest = np.maximum(self.settings.horizon - self._steps + 1, 1)[terminated]
-        charge = early_end(self.layout, float(self.settings.voltage_limit), price, rest)
+        values = self.population.values
+        motors = values["supply_voltage"][terminated], values["armature_resistance"][terminated]
+        charge = early_end(self.layout, *motors, price, rest)
         sight.figure("reward_tracking")[terminated] = charge.tracking
         sight.figure("reward_energy")[terminated] = charge.energy
         sight.figure("reward")[terminated] = charge.total
@@ -203,17 +223,15 @@ class Episodes:
         """Each target's angle on its circle now [rad], (B,)."""
         return self.targets.angle(self._steps)
 
-    def _looking(self, price: Price) -> tuple[Sight, Callable[[int, int], None]]:
-        target = self.targets.after(self._steps)
-        return looking(self.layout, self.simulator, self.pose, target, price, self._spent)
-
     def look(self, resting: NDArray[np.bool_] | None = None) -> Sight:
         """What is seen of every arm now, between control steps: power and rewards are zero.
 
         Arms of the mask `resting` draw no noise, since they have not been reset.
         """
-        sight, look = self._looking(Price(0.0, 0.0, 0.0, self.settings.regeneration))
-        look(0, self.num_envs)
+        price = (0.0, 0.0, 0.0, self.settings.regeneration)
+        sight = blank(self.num_envs, self._size)
+        observed = (*self._observed, price, self._spent, *sight)
+        observe.observe(*self.simulator.raw, *observed, 0, self.num_envs)
         self.sensing.complete(sight.observation, resting)
         return sight
 
@@ -221,7 +239,8 @@ class Episodes:
         """Fresh arrays of the step's figures, one row per arm; without a voltage, of a reset: also what was drawn."""
         info: dict[str, Any] = dict(zip(INFO_FIGURES, sight.figures, strict=False))
         info["voltage"] = np.zeros((self.num_envs, self.arm.n_joints)) if voltage is None else voltage
-        info["elbow_force"] = self.simulator.elbow_force.copy()
+        summary = self.simulator.raw[1].copy()
+        info["elbow_force"], info["constraint_residual"] = summary[:, SUMMARY_COLUMNS:], summary[:, RESIDUAL]
         info.update(self.sensing.info())
         if voltage is None:
             if self.population.randomization.ranges or self.population.changed:
@@ -246,6 +265,7 @@ class Episodes:
         everyone = np.arange(self.num_envs)
         self.simulator.set_parameters(everyone, self.population.put(everyone, state["parameters"]))
         restore(own, state)
+        self.actuation.take_values()
         self.sensing.set_noise(everyone, generators)
 
 

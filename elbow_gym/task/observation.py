@@ -76,6 +76,11 @@ class ObservationLayout:
             for f, size, end in zip(self.features, self.sizes, ends, strict=True)
         }
 
+    @cached_property
+    def starts(self) -> NDArray[np.int64]:
+        """First entry of each of `FEATURES`, (7,)."""
+        return np.array([self.slices[feature.name].start for feature in FEATURES], dtype=np.int64)
+
     @property
     def size(self) -> int:
         """Entries of the observation."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym.kernel import observe
+from elbow_gym.kernel.reward import reward
 from elbow_gym.parameters import Array
 from elbow_gym.task.observation import ObservationLayout
 
@@ -33,24 +33,27 @@ class Charge(NamedTuple):
     total: Array
 
 
-def early_end(layout: ObservationLayout, voltage_limit: float, price: Price, periods: NDArray[np.int64]) -> Charge:
-    """What control periods that will not be run cost: the worst that the observation's bounds allow in each.
+def early_end(
+    layout: ObservationLayout, voltage: Array, resistance: Array, price: Price, periods: NDArray[np.int64]
+) -> Charge:
+    """Cost of control periods that will not be run, so that ending early never pays.
 
-    Ending early never pays.
+    In each the hand is as far off as the observation's bounds allow, and every motor draws the current of its bound or,
+    where that is more, twice its stall current: that of a motor thrown from full speed into reverse.
 
     Args:
-        layout: the bounds.
-        voltage_limit: of the supply [V].
-        price: of error and power.
-        periods: how many are left of each arm's episode, (k,).
+        layout: bounds of the observation.
+        voltage: supply voltage of each arm [V], (k,).
+        resistance: armature resistances [ohm], (k, n).
+        price: price of error and power.
+        periods: control periods left of each arm's episode, (k,).
     """
     bound = layout.high * layout.scale
     worst_error = np.linalg.norm(bound[layout.slices["hand_error"]])
-    worst_power = voltage_limit * bound[layout.slices["current"]].sum()
-    tracking = -price.tracking_weight * (worst_error * periods)
-    energy = -price.energy_weight * (worst_power * periods)
-    total = [
-        observe.fused(-worst_power * left, price.energy_weight, term)
-        for left, term in zip(periods, tracking, strict=True)
+    current = np.maximum(bound[layout.slices["current"]], 2.0 * voltage[:, None] / resistance).sum(axis=1)
+    weights = price.tracking_weight, price.energy_weight
+    terms = [
+        reward(float(worst_error * left), float(power * left), *weights)
+        for left, power in zip(periods, voltage * current, strict=True)
     ]
-    return Charge(tracking, energy, np.array(total))
+    return Charge(*np.array(terms).T)

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym.kernel import observe
 from elbow_gym.kernel.rows import FIGURES
 from elbow_gym.parameters import Array
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.arm_batch import Population
 from elbow_gym.task.observation import ObservationLayout
-from elbow_gym.task.reward import Price
 from elbow_gym.task.settings import Settings
-from elbow_gym.task.targets import Target
 
 
 class Sight(NamedTuple):
@@ -32,28 +29,9 @@ class Sight(NamedTuple):
         return self.figures[FIGURES.index(name)]
 
 
-def looking(
-    layout: ObservationLayout, simulator: Simulator, pose: Array, target: Target, price: Price, spent: Array
-) -> tuple[Sight, Callable[[int, int], None]]:
-    """A sight still empty, and the function that fills its rows of arms first..end-1 when they have moved.
-
-    Args:
-        layout: the observation's entries.
-        simulator: the arms.
-        pose: what joint angles are counted from [rad], (n,).
-        target: what the hands should follow.
-        price: the reward's terms are -tracking_weight |hand - target| and -energy_weight P.
-        spent: energy paid before this control step [J], (B,), brought up to date.
-    """
-    arms = simulator.num_envs
-    sight = Sight(np.empty((arms, layout.size), np.float32), np.empty((len(FIGURES), arms)))
-
-    def look(first: int, end: int) -> None:
-        observe.observe(
-            *simulator.raw, pose, *target, layout.scale, layout.high, tuple(price), spent, *sight, first, end
-        )
-
-    return sight, look
+def blank(num_envs: int, size: int) -> Sight:
+    """A sight of B arms that the kernel is to fill."""
+    return Sight(np.empty((num_envs, size), np.float32), np.empty((len(FIGURES), num_envs)))
 
 
 class Sensing:

@@ -8,15 +8,18 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from elbow_gym.checks import non_negative, positive
-from elbow_gym.parameters import ArmParameters, as_arm, as_elbows
-from elbow_gym.simulation.options import TABLE_TIMESTEP, Conditions
+from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
+from elbow_gym.simulation.options import Conditions
+from elbow_gym.simulation.parameter_rows import quantities
+from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep, rates, schedule, worst_rows
 from elbow_gym.table import TableParameters, as_table
 from elbow_gym.task.circle import Circle, as_circle, check_reachable
 from elbow_gym.task.randomization import Randomization
 
 ACTION_UNITS = ("fraction", "volt")
-DEFAULT_TIMESTEP = 0.002
 STARTS = ("paper", "on_target")
 
 
@@ -31,7 +34,12 @@ class Settings:
     control_frequency: float = 50.0
     """How often an action is read [Hz]; it is held in between."""
     timestep: float | None = None
-    """Longest RK4 step [s], divided so that a whole number fits one control period; 0.002 s, with a table 0.001 s."""
+    """Longest step of the integrator [s], a whole number of which make a control period; refused where it is too long.
+
+    None: steps that grow after the voltage's jump, as long as the fastest rate of what was asked for allows.
+    """
+    integrator: str = "exponential"
+    """"exponential": Runge-Kutta of order 4 with exact decay of the currents; "rk4": the classical method."""
     duration: float = 5.0
     """Episode length [s]."""
     voltage_limit: float = 24.0
@@ -66,13 +74,11 @@ class Settings:
     """Dict of ranges that `Randomization` draws from at each reset."""
 
     def __post_init__(self) -> None:
-        if self.timestep is None:
-            object.__setattr__(self, "timestep", DEFAULT_TIMESTEP if self.table is False else TABLE_TIMESTEP)
-        for name in ("control_frequency", "timestep", "duration", "voltage_limit"):
+        for name in ("control_frequency", "duration", "voltage_limit"):
             positive(name, getattr(self, name))
         for name in ("start_noise", "tracking_weight", "energy_weight"):
             non_negative(name, getattr(self, name))
-        for name, allowed in (("action_unit", ACTION_UNITS), ("start", STARTS)):
+        for name, allowed in (("action_unit", ACTION_UNITS), ("start", STARTS), ("integrator", INTEGRATORS)):
             if getattr(self, name) not in allowed:
                 raise ValueError(f"{name} must be one of {allowed}, got {getattr(self, name)!r}")
         if not math.isfinite(self.duration * self.control_frequency):
@@ -82,7 +88,7 @@ class Settings:
                 f"duration must be at least one control period ({1 / self.control_frequency:g} s), got {self.duration}"
             )
         check_reachable(self._shortest_arm(), self.elbow_joints, self.parsed_circle)
-        _ = self.conditions
+        _ = self.substeps
 
     @cached_property
     def parsed_arm(self) -> ArmParameters:
@@ -131,11 +137,23 @@ class Settings:
         """Time between two actions [s]."""
         return 1.0 / self.control_frequency
 
-    @property
-    def n_substeps(self) -> int:
-        """RK4 steps in a control period."""
+    @cached_property
+    def substeps(self) -> Array:
+        """Lengths of the integrator's steps in a control period [s]."""
+        if self.timestep is None:
+            return schedule(self.control_period, self.rates, self.integrator)
+        timestep = positive("timestep", self.timestep)
+        check_timestep(timestep, self.control_period, self.rates, self.integrator)
         # A hair is taken off so that 0.02 s / 0.002 s is 10 whatever its rounding.
-        return max(1, math.ceil(self.control_period / float(self.timestep or DEFAULT_TIMESTEP) - 1e-9))
+        count = max(1, math.ceil(self.control_period / timestep - 1e-9))
+        return np.full(count, self.control_period / count)
+
+    @cached_property
+    def rates(self) -> dict[str, float]:
+        """Fastest rates of any arm that may be drawn [1/s], by the names of `step_limit.MECHANISMS`."""
+        arm, ranges = self.parsed_arm, self.randomization.ranges
+        rows, volts = worst_rows(quantities(arm), arm.gravity, self.conditions, ranges)
+        return rates(rows, self.conditions, volts, elbows=bool(self.elbow_joints))
 
     @property
     def horizon(self) -> int:

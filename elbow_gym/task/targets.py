@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,17 +12,6 @@ from elbow_gym.checks import restore
 from elbow_gym.parameters import Array
 from elbow_gym.task.circle import Circle, as_phase
 from elbow_gym.task.observation import LOOKAHEAD
-
-
-class Target(NamedTuple):
-    """What the hands of B arms should follow, at an instant."""
-
-    path: Array
-    """Each arm's path as Fourier rows [m], (B, rows, 3)."""
-    angle: Array
-    """Where the target stands on it [rad], (B,)."""
-    lookahead: Array
-    """Angle between the target and the look-ahead target [rad], (B,)."""
 
 
 class Targets:
@@ -42,12 +31,13 @@ class Targets:
         self._path = np.repeat(first.path[None], num_envs, axis=0)
         self._rate = np.full(num_envs, first.rate)
         self._phase = np.zeros(num_envs)
+        self._turn, self._lookahead = np.empty(num_envs), np.empty(num_envs)
         self._pace()
         self._alike = not circle.random
 
     def _pace(self) -> None:
         """What follows from the rates: how far the targets turn in a control period, and to the look-ahead [rad]."""
-        self._turn, self._lookahead = self._rate * self._period, self._rate * LOOKAHEAD
+        self._turn[:], self._lookahead[:] = self._rate * self._period, self._rate * LOOKAHEAD
 
     def draw(self, circle: Circle, generators: Sequence[np.random.Generator], phase: object = None) -> list[Circle]:
         """New circles, each by its arm's generator, which start at `phase` [rad] if it is given.
@@ -77,9 +67,12 @@ class Targets:
         """Angle of each target on its path after `steps` control periods [rad], (B,)."""
         return self._phase + self._turn * steps
 
-    def after(self, steps: NDArray[np.int64]) -> Target:
-        """What the hands should follow after `steps` control periods."""
-        return Target(self._path, self.angle(steps), self._lookahead)
+    def arguments(self, steps: NDArray[np.int64]) -> tuple[Array, Array, Array, NDArray[np.int64], Array]:
+        """What the kernel needs of the targets: paths, phases, turns, `steps` and look-aheads.
+
+        The arrays are this object's own and are brought up to date in place.
+        """
+        return self._path, self._phase, self._turn, steps, self._lookahead
 
     def position(self, angle: Array) -> Array:
         """Each target's position at its angle [m], (B, 3)."""

@@ -82,18 +82,17 @@ def test_seventy_thousand_steps_of_the_worst_voltages_stay_within_the_bounds(nam
         assert np.isfinite(reward).all()
         assert all(np.isfinite(info[key]).all() for key in ("contact_loss", "temperature_rise") if key in info)
         ended += int(terminated.sum())
-    assert arms * periods * env.settings.n_substeps > 70_000
+    assert arms * periods * len(env.settings.substeps) > 70_000
     # Friction may jam an elbow where all links under it stand upright; nothing else ends an episode.
     assert ended <= (2 if env.settings.elbow_friction > 0.0 else 0)
 
 
-def test_default_timestep_is_shorter_with_a_table_and_a_longer_one_is_refused():
-    assert ElbowArmEnv().settings.timestep == 0.002
-    assert ElbowArmEnv(table=True).settings.timestep == 0.001
-    with pytest.raises(
-        ValueError, match=r"^timestep must be at most 0\.001 s \(RK4's limit for the table\), got 0\.002"
-    ):
-        ElbowArmEnv(table=True, timestep=0.002)
+def test_a_resets_parameters_are_refused_where_the_environments_steps_are_too_long_for_them():
+    env = ElbowArmEnv()
+    env.reset(seed=0, options={"parameters": {"joint_viscous_friction": 0.5}})
+    message = r"^options\['parameters'\] must allow substeps of 0\.0055 s, got 0\.000638 s at most, for the rate"
+    with pytest.raises(ValueError, match=message):
+        env.reset(options={"parameters": {"joint_viscous_friction": 5.0}})
 
 
 def test_resting_on_the_table_is_seen_and_told():

@@ -203,7 +203,9 @@ LONG_ARM = ArmParameters(
         ({"num_envs": 2.0}, r"num_envs must be a positive integer, got 2\.0"),
         ({"num_threads": 0}, "num_threads must be a positive integer, got 0"),
         ({"timestep": 0.0}, r"timestep must be positive, got 0\.0"),
-        ({"timestep": 0.0042}, r"timestep must be at most 0\.00417 s .*, got 0\.0042"),
+        ({"timestep": 0.006}, r"timestep must be at most 0\.0055 s, for the rate 'friction' .*, got 0\.006"),
+        ({"timestep": 0.003, "integrator": "rk4"}, r"timestep must be at most 0\.00216 s, for the rate 'armature' .*"),
+        ({"integrator": "euler"}, r"integrator must be one of \('exponential', 'rk4'\), got 'euler'"),
         ({"elbows": (2,)}, r"elbows must be joints 3 to 10 .*, got 2"),
         ({"arm": LONG_ARM, "elbows": tuple(range(3, 12))}, "elbows must be at most 8, got 9"),
         ({"arm": "puma"}, "arm must be one of .*, got 'puma'"),
@@ -230,8 +232,8 @@ def test_a_simulator_that_cannot_be_is_refused(options, message):
         (lambda sim: sim.reset(mask=np.ones(3, bool)), r"mask must have shape \(2,\), got \(3,\)"),
         (lambda sim: sim.set_state({}), r"state\['state'\] must have shape .*, got nothing"),
         (
-            lambda sim: sim.set_state(sim.get_state() | {"steps": np.zeros(3)}),
-            r"state\['steps'\] must have shape \(2,\)",
+            lambda sim: sim.set_state(sim.get_state() | {"clock": np.zeros(3)}),
+            r"state\['clock'\] must have shape \(2, 2\)",
         ),
     ],
 )

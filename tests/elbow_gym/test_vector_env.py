@@ -11,9 +11,7 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv
 from elbow_gym.kernel.build import kernel
-from elbow_gym.kernel.observe import drive
 from elbow_gym.kernel.slots import BLOCK_LANES
-from tests.support.kernel_calls import NOTHING
 
 MODES = list(AutoresetMode)
 RESETTING = [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP]
@@ -221,7 +219,7 @@ def test_neither_memory_order_nor_precision_of_the_actions_changes_a_bit_or_has_
     for one in (env, twin):
         one.reset(seed=0)
     expected = [twin.step(action) for action in actions(3, 3)]
-    compiled = [drive, kernel(BLOCK_LANES, **NOTHING).advance]
+    compiled = [kernel(BLOCK_LANES).control_step]
     before = [entry.signatures for entry in compiled]
     assert same([env.step(order(action)) for action in actions(3, 3)], expected)
     assert [entry.signatures for entry in compiled] == before

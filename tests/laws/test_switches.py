@@ -5,12 +5,19 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from elbow_gym import dynamics, motors, paper_arm
 from elbow_gym.kernel.build import kernel
-from elbow_gym.kernel.rows import PARAMETERS, STATE_ROWS, SUMMARY_COLUMNS, SWITCHED_STATE, SWITCHED_STATE_ROWS
+from elbow_gym.kernel.rows import (
+    LARGEST_AMPLIFICATION,
+    PARAMETERS,
+    STATE_ROWS,
+    SUMMARY_COLUMNS,
+    SWITCHED_STATE,
+    SWITCHED_STATE_ROWS,
+)
 from elbow_gym.kernel.slots import BLOCK_LANES
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
@@ -89,8 +96,14 @@ def test_fast_form_equals_the_reference_with_every_switch(make, on, data):
     state[0, :3] = case.q, case.q_dot, case.current
     state[0, SWITCHED_STATE.index("temperature_rise") + STATE_ROWS] = rise
     parameters = parameter_table(case.arm, under)[None]
+    wanted = expected(case, under, rise)
+    if under.elbow_friction:
+        # Where friction jams an arm, the kernel bounds what it adds and the reference does not.
+        smooth = expected(case, replace(under, elbow_friction=0.0), rise).elbow_force
+        largest = LARGEST_AMPLIFICATION * np.abs(smooth).max(initial=0.0)
+        assume(wanted.elbow_force.max(initial=0.0) <= largest)
     found = accelerations(1, state, parameters, case.voltage[None], case.elbows, make, **on)
-    for value, reference, tolerance in zip(found, expected(case, under, rise), (1e-9, 1e-9, 1e-12), strict=True):
+    for value, reference, tolerance in zip(found, wanted, (1e-9, 1e-9, 1e-12), strict=True):
         assert_close(value[0], reference, tolerance)
 
 
@@ -111,9 +124,13 @@ def advanced(entries, rows, on):
     state, elbows = np.zeros((3, rows, 10)), np.array([4, 7])
     state[:, 0] = paper_arm().nominal_pose + 0.02 * rng.normal(size=(3, 10))
     state[:, 1:3] = rng.normal(size=(3, 2, 10))
+    if on["table"]:
+        # The last arm's links beyond its elbows press on the table from the start to the end.
+        state[2, 0, 6:] = np.pi / 2.0 + 0.02 - state[2, 0, 1:6].sum(), 0.0, 0.0, 0.0
+        state[2, 1] = 0.0
     parameters = parameters * rng.uniform(0.8, 1.25, (3, *parameters.shape))
     summary, voltage = np.zeros((3, SUMMARY_COLUMNS + 2)), rng.uniform(-20.0, 20.0, (3, 10))
-    entries.advance(state, parameters, voltage, elbows, 0, 3, 10, 5e-4, summary)
+    entries.advance(state, parameters, voltage, elbows, np.full(10, 5e-4), summary, 0, 3)
     return state, summary
 
 

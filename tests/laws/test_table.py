@@ -1,4 +1,4 @@
-"""Whole runs on the compliant table: it never pulls, no joule is missing, RK4 converges to another integrator."""
+"""Whole runs on the compliant table: it never pulls, no joule is missing, runs converge to another integrator's."""
 
 from dataclasses import replace
 from functools import cache
@@ -99,10 +99,11 @@ def test_contacts_push_rub_against_the_sliding_and_only_take_energy(case):
 
 
 def unpowered(arm, **table):
-    """One arm without motors' braking or any friction of its own, on a table, RK4 at 0.02 ms."""
+    """One arm without motors' braking or any friction of its own, on a table, at 0.02 ms."""
     idle = MotorParameters(torque_constant=1e-12, gear_viscous_friction=0.0)
     loose = replace(arm, motors=(idle,) * arm.n_joints, joint_viscous_friction=(0.0,) * arm.n_joints)
-    return Simulator(loose, 0, timestep=2e-5, table=table)
+    # Of a supply that gives next to nothing, such motors do not speed up without end.
+    return Simulator(loose, 0, timestep=2e-5, table=table, supply_voltage=1e-12)
 
 
 @pytest.mark.parametrize(("dissipation", "friction"), [(0.5, 0.0), (0.0, 0.3), (1.0, 0.3)])
@@ -115,7 +116,7 @@ def test_a_bounce_takes_what_the_contacts_lose_and_never_gives_energy(dissipatio
         energies.append(stored(sim))
         pressed.append(sim.contact_force[0, :, 2].any())
     assert np.diff(pressed).sum() > 3
-    # RK4's own error where contact begins.
+    # The integrator's own error where contact begins.
     assert np.diff(energies).max() < 1e-7
     assert energies[0] - energies[-1] == pytest.approx(sim.contact_loss.sum(), abs=1e-6)
     assert sim.contact_loss.sum() > 0.01
@@ -146,9 +147,9 @@ def test_a_dropped_arm_comes_to_rest_at_the_depth_that_carries_it(friction):
 
 
 def test_the_papers_arm_lying_flat_rests_on_every_joint_with_a_links_weight():
-    sim = Simulator(paper_arm(), 0, timestep=1e-3, table=True)
+    sim = Simulator(paper_arm(), 0, timestep=5e-4, table=True)
     sim.reset(np.pi / 2.0 * np.eye(10)[1])
-    sim.step(np.zeros(10), 5000)
+    sim.step(np.zeros(10), 10_000)
     # Each joint carries half of the two links that meet there, the hand half of the last one.
     weight = 0.1 * 9.81
     np.testing.assert_allclose(sim.contact_force[0, :, 2], [weight] * 8 + [weight / 2.0], rtol=1e-4)
@@ -180,11 +181,11 @@ def test_runs_converge_to_the_reference_equations_integrated_elsewhere():
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("elbows", [0, 2])
 def test_the_table_never_pulls_through_seconds_of_full_voltage(elbows, friction):
-    sim = Simulator("paper", elbows, 32, timestep=1e-3, table={"friction": friction})
+    sim = Simulator("paper", elbows, 32, timestep=5e-4, table={"friction": friction})
     rng, loss, pressed = np.random.default_rng(1), sim.contact_loss.copy(), 0.0
     for k in range(150):
         bang = 24.0 * rng.choice([-1.0, 1.0], (32, 10))
-        sim.step(bang if k % 2 else rng.uniform(-24.0, 24.0, (32, 10)), 20)
+        sim.step(bang if k % 2 else rng.uniform(-24.0, 24.0, (32, 10)), 40)
         assert sim.valid.all()
         assert (sim.contact_force[..., 2] >= 0.0).all()
         assert (sim.contact_loss >= loss).all()
@@ -193,11 +194,10 @@ def test_the_table_never_pulls_through_seconds_of_full_voltage(elbows, friction)
 
 
 @pytest.mark.parametrize(
-    ("table", "limit"), [(True, "0.001"), ({"stiffness": 1e3}, "0.001"), ({"stiffness": 4e5}, "0.0005")]
+    ("table", "limit"), [(True, 0.000784), ({"stiffness": 5e3}, 0.00157), ({"stiffness": 3.2e5}, 0.000196)]
 )
 def test_a_step_too_long_for_the_table_is_refused(table, limit):
-    with pytest.raises(
-        ValueError, match=rf"^timestep must be at most {limit} s \(RK4's limit for the table\), got 0.002$"
-    ):
+    # In proportion to 1 / sqrt(stiffness).
+    with pytest.raises(ValueError, match=rf"^timestep must be at most {limit} s, for the rate 'table' .*, got 0.002$"):
         Simulator("paper", 0, timestep=0.002, table=table)
-    Simulator("paper", 0, timestep=float(limit), table=table)
+    Simulator("paper", 0, timestep=0.99 * limit, table=table)

@@ -106,11 +106,12 @@ def test_every_info_key_is_documented_with_its_unit():
         "link_work": "[J]",
         "voltage": "[V]",
         "elbow_force": "[N]",
+        "constraint_residual": "[m/s^2]",
         "below_table": "[s]",
     }
     assert set(info) == {*units, "reward_tracking", "reward_energy"} == set(re.findall(r"\w+_\w+|voltage", sentence))
     for key, unit in units.items():
-        assert re.search(rf"\b{key}\b[^\[]*(\[\w+\])", sentence)[1] == unit
+        assert re.search(rf"\b{key}\b[^\[]*(\[[\w/^]+\])", sentence)[1] == unit
 
 
 @pytest.mark.parametrize(

@@ -3,30 +3,22 @@
 from functools import cache
 
 import numpy as np
-from numba.core import config
 
 from elbow_gym import paper_arm
-from elbow_gym.kernel.build import kernel
+from elbow_gym.kernel.build import assemble, kernel
 from elbow_gym.kernel.rows import PARAMETER_ROWS, STATE_ROWS, SUMMARY_COLUMNS
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 
 ELBOWS = (4, 7)
-NOTHING = {"table": False, "rubbing": False, "drive": False}
-"""Switches as the simulator names them: asked for in another way, a kernel is another copy, and compiled again."""
-EVERYTHING = dict.fromkeys(NOTHING, True)
-
-_build = kernel.__wrapped__
+EVERYTHING = {"table": True, "rubbing": True, "drive": True}
 
 
 @cache
 def uncompiled(lanes, **switches):
     """The kernel's entries as plain Python: a millisecond for a step of one arm, and nothing to compile."""
-    disabled, config.DISABLE_JIT = config.DISABLE_JIT, True
-    try:
-        return _build(lanes, **switches)
-    finally:
-        config.DISABLE_JIT = disabled
+    off = dict.fromkeys(EVERYTHING, False)
+    return assemble(lanes, lambda function, **_: function, **({**off, "exponential": True} | switches))
 
 
 def states(q, q_dot, current):
@@ -40,7 +32,7 @@ def accelerations(lanes, state, parameters, voltage, elbows, make=kernel, **swit
     """The kernel's q_ddot, elbow forces and current rates of a batch; `make` is what gives the kernel's entries."""
     q_ddot, current_dot, force = np.zeros_like(voltage), np.zeros_like(voltage), np.zeros((len(voltage), len(elbows)))
     joints = np.array(elbows, dtype=np.int64)
-    make(lanes, **(NOTHING | switches)).accelerations(state, parameters, voltage, joints, q_ddot, current_dot, force)
+    make(lanes, **switches).accelerations(state, parameters, voltage, joints, q_ddot, current_dot, force)
     return q_ddot, force, current_dot
 
 
@@ -65,5 +57,5 @@ def advanced(lanes, size, n_steps=20, elbows=ELBOWS):
     state, parameters, voltage = batch(size)
     summary = np.zeros((size, SUMMARY_COLUMNS + len(elbows)))
     joints = np.array(elbows, dtype=np.int64)
-    kernel(lanes, **NOTHING).advance(state, parameters, voltage, joints, 0, size, n_steps, 0.001, summary)
+    kernel(lanes).advance(state, parameters, voltage, joints, np.full(n_steps, 0.001), summary, 0, size)
     return np.concatenate([state.reshape(size, -1), summary], axis=1)

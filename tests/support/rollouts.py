@@ -11,7 +11,6 @@ from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv
 from elbow_gym.kernel import observe
 from elbow_gym.kernel.build import kernel
 from elbow_gym.kernel.slots import BLOCK_LANES
-from tests.support.kernel_calls import NOTHING
 
 SETTINGS = {"circle": {"phase": "random"}, "duration": 0.5}
 
@@ -44,8 +43,8 @@ def batch(seed, num_envs=20, num_threads=1):
 
 def compiled():
     """How many of the compiled functions that a rollout calls were not in the cache."""
-    entries = [entry for lanes in (1, BLOCK_LANES) for entry in kernel(lanes, **NOTHING)]
-    return sum(sum(entry.stats.cache_misses.values()) for entry in (*entries, observe.drive, observe.observe))
+    entries = [entry for lanes in (1, BLOCK_LANES) for entry in kernel(lanes)]
+    return sum(sum(entry.stats.cache_misses.values()) for entry in (*entries, observe.path, observe.observe))
 
 
 if __name__ == "__main__":

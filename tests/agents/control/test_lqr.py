@@ -21,7 +21,7 @@ def test_linearised_period_predicts_the_simulators_next_state(arm, elbows):
     current, voltage = 1e-3 * rng.normal(size=10), 1e-3 * rng.normal(size=10)
     poses = simulator.on_table(np.array([arm.nominal_pose, arm.nominal_pose + 1e-4 * rng.normal(size=10)]))
     simulator.reset(poses, current=np.stack([np.zeros(10), current]))
-    simulator.step(np.stack([np.zeros(10), voltage]), settings.n_substeps)
+    simulator.advance(np.stack([np.zeros(10), voltage]), settings.substeps)
     after = np.concatenate([simulator.q, simulator.q_dot, simulator.current], axis=-1)
     deviation = np.concatenate([poses[1] - poses[0], np.zeros(10), current])
     np.testing.assert_allclose(A[0] @ deviation + B[0] @ voltage, after[1] - after[0], atol=2e-5)
@@ -47,9 +47,9 @@ def slopes_of_cost(settings, state, voltage, planned):
     The cost is the LQR's: mean power, the smoothed distance from the target, and the distance from the planned pose.
     """
     nudge = np.concatenate([np.eye(10), -np.eye(10)]) * 1e-3
-    simulator = Simulator(settings.parsed_arm, settings.elbow_joints, 20, timestep=settings.timestep)
+    simulator = Simulator(settings.parsed_arm, settings.elbow_joints, 20)
     simulator.reset(*np.split(state, 3))
-    simulator.step(voltage + nudge, settings.n_substeps)
+    simulator.advance(voltage + nudge, settings.substeps)
     circle = settings.parsed_circle
     error = simulator.hand_position - circle.position(circle.angle(settings.duration, float(circle.phase)))
     distance = np.sqrt((error**2).sum(axis=1) + lqr.SMOOTHING**2)

@@ -9,7 +9,7 @@ from elbow_gym.vector_env import ElbowArmVectorEnv
 
 
 def volts_env(num_envs=3, **more):
-    settings = {"action_unit": "volt", "voltage_limit": 1000.0, "control_frequency": 1000.0, "timestep": 0.001}
+    settings = {"action_unit": "volt", "voltage_limit": 1000.0, "control_frequency": 1000.0}
     return ElbowArmVectorEnv(num_envs, **{**settings, **more})
 
 

@@ -149,7 +149,7 @@ def test_a_table_that_pulls_is_disclosed(cases):
 
 def synthetic(elbows):
     """A made-up run: the hand `1 + elbows` cm under the target, every joint at constant power."""
-    settings = reproduce.settings_of(elbows, "paper", control_frequency=100.0, timestep=0.002)
+    settings = reproduce.settings_of(elbows, "paper", control_frequency=100.0)
     time = np.linspace(0.0, 5.0, 501)
     target = papers_target(time)
     ramp = np.repeat(time[:, None, None], 10, axis=2)
@@ -278,21 +278,22 @@ def test_runs_in_other_processes_report_their_progress_and_their_errors():
         reproduce.play_all({0: beyond}, told.append)
 
 
-def direct(elbows, timestep, limit):
+def direct(elbows, period, limit, steps=None):
     """Energies and errors of the PD law on the bare simulator, from the paper's start and from the target's pose."""
-    simulator = Simulator(elbows=elbows, num_envs=2, timestep=timestep)
-    pose, steps = simulator.arm.nominal_pose, round(5.0 / timestep)
-    angle = Circle().angle(np.arange(steps + 1) * timestep, 0.0)
+    simulator = Simulator(elbows=elbows, num_envs=2)
+    steps = np.array([period]) if steps is None else steps
+    pose, periods = simulator.arm.nominal_pose, round(5.0 / period)
+    angle = Circle().angle(np.arange(periods + 1) * period, 0.0)
     target = Circle().position(angle)
     q_d, q_d_dot = inverse_kinematics(simulator.arm, pose, target, Circle().velocity(angle))
     simulator.reset(np.stack([pose, q_d[0]]))
     q, q_dot = simulator.q, simulator.q_dot
-    settled, error, force = round(2.0 / timestep), np.empty((steps + 1, 3)), np.empty((steps + 1, elbows))
-    for k in range(steps):
+    settled, error, force = round(2.0 / period), np.empty((periods + 1, 3)), np.empty((periods + 1, elbows))
+    for k in range(periods):
         if k == settled:
             spent = simulator.electrical_energy[0].sum()
         voltage = PAPER_KP * (q_d[k] - q) + PAPER_KD * (q_d_dot[k] - q_dot)
-        simulator.advance(np.minimum(np.maximum(voltage, -limit), limit), 1)
+        simulator.advance(np.minimum(np.maximum(voltage, -limit), limit), steps)
         error[k + 1] = simulator.hand_position[0] - target[k + 1]
         force[k + 1] = simulator.elbow_force[0]
     squared = 1e6 * (error[settled + 1 :] ** 2).mean(axis=0)
@@ -329,9 +330,10 @@ def test_paper_cases_are_as_published(elbows):
 
 
 def test_case_played_in_the_environment_is_the_bare_simulators():
-    values = reproduce.play(reproduce.settings_of(2, "paper", control_frequency=2000.0, timestep=5e-4)).values
+    settings = reproduce.settings_of(2, "paper", control_frequency=2000.0)
+    values = reproduce.play(settings).values
     values["joint_1"] = values["joint_energy"][0]
-    expected = direct(2, 5e-4, 1000.0)
+    expected = direct(2, 5e-4, 1000.0, settings.substeps)
     for name in expected.keys() & values.keys():
         # Observations and actions are single precision.
         assert values[name] == pytest.approx(expected[name], rel=1e-6), name

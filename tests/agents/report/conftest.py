@@ -14,7 +14,7 @@ from tests.support.recordings import made_up, papers_target
 
 def synthetic(elbows, start):
     """A made-up run whose numbers differ between joints, cases, starts and instants; the arm stands still."""
-    settings = settings_of(elbows, "paper", control_frequency=100.0, timestep=0.002, start=start)
+    settings = settings_of(elbows, "paper", control_frequency=100.0, start=start)
     time = np.linspace(0.0, 5.0, 501)
     target = papers_target(time)
     factor = (3.0 - elbows) * (2.0 if start == "paper" else 1.0)

@@ -19,7 +19,7 @@ from elbow_gym.kernel.sine import sincos
 from elbow_gym.kernel.slots import BLOCK_LANES
 from elbow_gym.kernel.template import compiled
 from elbow_gym.simulation.parameter_rows import parameter_table
-from tests.support.kernel_calls import ELBOWS, NOTHING, accelerations, advanced, batch, states
+from tests.support.kernel_calls import ELBOWS, accelerations, advanced, batch, states
 
 ROOT = Path(__file__).parents[3]
 VECTORS = np.load(ROOT / "tests" / "vectors" / "forward_dynamics_vectors.npz")
@@ -79,7 +79,7 @@ def test_an_uncompiled_kernel_of_odd_width_gives_the_same_bits():
 def test_only_the_arms_asked_for_move():
     state, parameters, voltage = batch(40)
     before, summary = state.copy(), np.zeros((40, SUMMARY_COLUMNS))
-    kernel(16, **NOTHING).advance(state, parameters, voltage, np.zeros(0, np.int64), 5, 23, 3, 0.001, summary)
+    kernel(16).advance(state, parameters, voltage, np.zeros(0, np.int64), np.full(3, 0.001), summary, 5, 23)
     moved = (state != before).any(axis=(1, 2))
     np.testing.assert_array_equal(np.flatnonzero(moved), np.arange(5, 23))
     np.testing.assert_array_equal(np.flatnonzero(summary.any(axis=1)), np.arange(5, 23))
@@ -92,10 +92,10 @@ def test_an_arm_that_blows_up_keeps_its_state_and_spares_its_neighbours(lanes, v
     voltage[3] = volts
     before, summary = state.copy(), np.full((7, SUMMARY_COLUMNS + 2), 7.0)
     summary[:, BELOW_TABLE] = 0.0
-    invalid = kernel(lanes, **NOTHING).advance(state, parameters, voltage, np.array(ELBOWS), 0, 7, 20, 0.001, summary)
+    invalid = kernel(lanes).advance(state, parameters, voltage, np.array(ELBOWS), np.full(20, 0.001), summary, 0, 7)
     assert invalid == 1
     np.testing.assert_array_equal(state[3], before[3])
-    np.testing.assert_array_equal(summary[3], [7.0, 7.0, 7.0, 7.0, 0.0, 0.0, 7.0, 7.0])
+    np.testing.assert_array_equal(summary[3], [7.0, 7.0, 7.0, 7.0, 0.0, 0.0, 7.0, 7.0, 7.0])
     found, expected = np.concatenate([state.reshape(7, -1), summary], axis=1), advanced(lanes, 7)
     np.testing.assert_array_equal(np.delete(found, 3, axis=0), np.delete(expected, 3, axis=0))
 
@@ -110,7 +110,7 @@ def test_elbows_that_cannot_move_leave_the_rest_finite(arm):
 
 def test_settling_a_horizontal_link_is_a_turn_of_its_joint(arm):
     q = np.array([[0.3, 1.2, 0.5, *np.zeros(7)]])
-    kernel(1, **NOTHING).project_poses(q, parameter_table(arm)[None], np.array([3]))
+    kernel(1).project_poses(q, parameter_table(arm)[None], np.array([3]))
     # Joint 3 comes down as link 2 turns to 90 degrees; link 3 keeps its absolute pitch.
     np.testing.assert_allclose(q[0, :4], [0.3, np.pi / 2.0, 1.7 - np.pi / 2.0, 0.0], atol=1e-15)
 
@@ -119,7 +119,7 @@ def test_settling_a_horizontal_link_is_a_turn_of_its_joint(arm):
 def test_settling_lays_elbows_on_the_plane_by_the_least_change_of_pitch(arm, lanes):
     start = arm.nominal_pose + 1e-5 * np.random.default_rng(2).normal(size=(5, 10))
     q = start.copy()
-    kernel(lanes, **NOTHING).project_poses(q, np.repeat(parameter_table(arm)[None], 5, axis=0), np.array(ELBOWS))
+    kernel(lanes).project_poses(q, np.repeat(parameter_table(arm)[None], 5, axis=0), np.array(ELBOWS))
     assert np.abs(kinematics.elbow_heights(arm, q, ELBOWS)).max() < 1e-15
     # A least change has no part along the plane: it is a sum of the two heights' gradients in the absolute pitches.
     shift = (kinematics.pitches(q) - kinematics.pitches(start))[:, 1:]

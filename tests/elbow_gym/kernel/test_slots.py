@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from elbow_gym import paper_arm
-from elbow_gym.kernel import entries, rows, slots
+from elbow_gym.kernel import control, rows, slots
 from elbow_gym.kernel.template import TEMPLATES, instances
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
@@ -18,6 +18,7 @@ from elbow_gym.table import TableParameters
 FIXED = {"U", "LANES", "NEXT", "W", "STRIDE", "BLOCK_LANES"}
 SHARED = {
     "FORCES", "BELOW", "SHIFT", "ACTIVE", "MATRIX", "COUPLING", "FREE_RISE", "SLIDE_R", "SLIDE_T", "PUSHING", "PUSH",
+    "PUSH_LIMIT",
 }  # fmt: skip
 SLOTS = {name for name, value in vars(slots).items() if isinstance(value, np.uint64)} - FIXED | {"X", "Y"}
 
@@ -108,16 +109,21 @@ def moving_arms(on):
     return state, parameters, rng.uniform(-24.0, 24.0, (2, 10))
 
 
-@pytest.mark.parametrize("switches", [(), ("table",), ("rubbing",), ("drive",), ("table", "rubbing", "drive")])
+@pytest.mark.parametrize(
+    "switches", [(), ("classical", "drive"), ("table",), ("rubbing",), ("drive",), ("table", "rubbing", "drive")]
+)
 def test_no_two_live_quantities_share_a_row(switches):
     # A row of its own for every quantity changes nothing, so no pass finds another's value in a shared one.
+    on = {name: name in switches for name in ("table", "rubbing", "drive")}
+
     def run(reuse):
-        on = {name: name in switches for name in ("table", "rubbing", "drive")}
-        known = slots.offsets(1, **on, reuse=reuse)
-        advance = instances(known, "interpreted", lambda function, **_: function)[entries.advance.__name__]
+        known = slots.offsets(1, **on, exponential="classical" not in switches, reuse=reuse)
+        advance = instances(known, "interpreted", lambda function, **_: function)[control.advance.__name__]
         state, parameters, voltage = moving_arms(on)
         summary = np.zeros((len(state), rows.SUMMARY_COLUMNS + 2))
-        assert advance(state, parameters, voltage, np.array([4, 7]), 0, len(state), 2, 1e-3, summary) == 0
+        assert (
+            advance(state, parameters, voltage, np.array([4, 7]), np.array([1e-3, 2e-3]), summary, 0, len(state)) == 0
+        )
         return state, summary
 
     for shared, own in zip(run(True), run(False), strict=True):

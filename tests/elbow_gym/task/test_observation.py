@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from elbow_gym import Circle, Simulator, paper_arm
+from elbow_gym.kernel.observe import observe
 from elbow_gym.kinematics import hand_position
 from elbow_gym.task import observation as task
 from elbow_gym.task.reward import Price
-from elbow_gym.task.sensing import looking
-from elbow_gym.task.targets import Target
+from elbow_gym.task.sensing import blank
 
 ARM = paper_arm()
 CIRCLE = Circle(plane="radial", radius=0.2, period=4.0)
@@ -29,12 +29,13 @@ def arms():
     return simulator
 
 
-def look(simulator, price=FREE, spent=0.0):
+def look(simulator, price=FREE, spent=0.0, paid=None):
     path = np.repeat(CIRCLE.path[None], 3, axis=0)
-    target = Target(path, ANGLE, np.full(3, CIRCLE.rate * task.LOOKAHEAD))
-    paid = np.full(3, spent)
-    sight, fill = looking(LAYOUT, simulator, POSE, target, price, paid)
-    fill(0, 3)
+    # Two control periods of 0.1 rad on.
+    target = (path, ANGLE - 0.2, np.full(3, 0.1), np.full(3, 2), np.full(3, CIRCLE.rate * task.LOOKAHEAD))
+    sight, paid = blank(3, LAYOUT.size), np.full(3, spent) if paid is None else paid
+    layout = (LAYOUT.starts, LAYOUT.scale, LAYOUT.high)
+    observe(*simulator.raw, POSE, *target, *layout, tuple(price), paid, *sight, 0, 3)
     return sight
 
 
@@ -141,9 +142,6 @@ def test_reward_terms_are_weight_times_error_and_mean_power(regeneration, meter)
 
 def test_a_look_between_steps_is_free_and_remembers_what_is_paid():
     simulator, spent = arms(), np.zeros(3)
-    path = np.repeat(CIRCLE.path[None], 3, axis=0)
-    target = Target(path, ANGLE, np.zeros(3))
-    sight, fill = looking(LAYOUT, simulator, POSE, target, FREE, spent)
-    fill(0, 3)
+    sight = look(simulator, paid=spent)
     np.testing.assert_array_equal(sight.figures[[1, 5, 6, 8]], 0.0)
     np.testing.assert_allclose(spent, simulator.electrical_energy.sum(axis=1), rtol=1e-13)

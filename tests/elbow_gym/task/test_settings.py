@@ -3,6 +3,7 @@ import json
 import math
 import re
 
+import numpy as np
 import pytest
 
 from elbow_gym import Circle, paper_arm
@@ -110,16 +111,48 @@ def test_settings_cannot_be_changed():
 def test_control_period_is_divided_into_the_fewest_steps_of_at_most_the_timestep(
     control_frequency, timestep, n_substeps
 ):
-    settings = Settings(control_frequency=control_frequency, timestep=timestep)
-    assert settings.n_substeps == n_substeps
-    step = settings.control_period / settings.n_substeps
-    assert step * n_substeps * control_frequency == pytest.approx(1.0, rel=1e-15)
-    assert step <= timestep * (1.0 + 1e-9)
+    steps = Settings(control_frequency=control_frequency, timestep=timestep).substeps
+    assert len(steps) == n_substeps
+    assert np.ptp(steps) == 0.0
+    assert steps.sum() * control_frequency == pytest.approx(1.0, rel=1e-12)
+    assert steps.max() <= timestep * (1.0 + 1e-9)
 
 
 def test_ten_kilohertz_control_makes_one_step_of_a_tenth_of_a_millisecond():
-    settings = Settings(control_frequency=10_000.0)
-    assert settings.control_period / settings.n_substeps == pytest.approx(1e-4, rel=1e-15)
+    assert Settings(control_frequency=10_000.0).substeps == pytest.approx([1e-4], rel=1e-15)
+
+
+def test_default_steps_grow_after_the_voltages_jump_to_the_longest_that_the_fastest_rate_allows():
+    settings = Settings()
+    assert settings.timestep is None
+    # 0.6, 1.2, 1.8 and 2.2 over (D + D_m) / J = 400 1/s.
+    assert settings.substeps == pytest.approx([0.0015, 0.003, 0.0045, 0.0055, 0.0055], rel=1e-3)
+    assert settings.substeps.sum() == pytest.approx(0.02, rel=1e-15)
+    sagging = Settings(supply_resistance=0.3)
+    assert sagging.substeps.max() < 0.25 * settings.substeps.max()
+    drawn = Settings(randomize={"joint_viscous_friction": [0.5, 2.0]})
+    assert drawn.substeps.max() < 0.6 * settings.substeps.max()
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"timestep": 0.1}, r"timestep must be at most 0\.0055 s, for the rate 'friction' of 399\.7 1/s .*, got 0\.1$"),
+        ({"timestep": 1e-12}, r"timestep must be at least 1e-05 s, for at most 2000 substeps .*, got 1e-12$"),
+        (
+            {"table": True, "timestep": 0.002},
+            r"timestep must be at most 0\.000784 s, for the rate 'table' .*",
+        ),
+        (
+            {"table": {"stiffness": 1e12}},
+            r"a control period must take at most 2000 substeps, .* the rate 'table' ",
+        ),
+        ({"integrator": "euler"}, r"integrator must be one of \('exponential', 'rk4'\), got 'euler'$"),
+    ],
+)
+def test_steps_that_are_too_long_or_too_many_are_refused_by_name(more, message):
+    with pytest.raises(ValueError, match=f"^{message}"):
+        Settings(**more)
 
 
 @pytest.mark.parametrize("control_frequency", [1.0, 7.0, 30.0, 50.0, 333.0, 1000.0])

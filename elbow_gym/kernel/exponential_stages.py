@@ -1,0 +1,154 @@
+"""Stages of an exponential Runge-Kutta method: the currents' own decay is exact, all else is classical.
+
+L i_dot = N - R i with the net voltage N = v - K_m q_dot decays at R / L, faster than anything else in a free arm. Over
+a step h let N be the parabola through its values N_0, N_m, N_1 at the start, the middle and the end. With z = h R / L
+and
+
+    phi_0 = e^-z,   phi_k = (1/(k-1)! - phi_(k-1)) / z,
+
+that gives the current at the end and its mean over the step exactly,
+
+    i_1  = phi_0 i_0 + h/L [phi_1 N_0 + phi_2 (-3 N_0 + 4 N_m - N_1) + 2 phi_3 (2 N_0 - 4 N_m + 2 N_1)]
+    mean = phi_1 i_0 + h/L [phi_2 N_0 + phi_3 (-3 N_0 + 4 N_m - N_1) + 2 phi_4 (2 N_0 - 4 N_m + 2 N_1)]
+
+and, after half a step of constant N, i = e^(-z/2) i_0 + h/2L phi_1(z/2) N. Angles and rates take the classical stages,
+whose last current is set so that Simpson's mean of the four is the mean above: the motion then gets the impulse of the
+current's transient right, however short it is. That current differs from the solution by O(h^4) and counts with h/6,
+so the step stays of order 4.
+
+Energies take Simpson's sum of the stages, which the mean current makes exact for v i under a constant voltage. The four
+stages are one method, so they are one file.
+"""
+
+# pyright: basic
+
+from elbow_gym.kernel.acceleration import close_meters, turn_plane
+from elbow_gym.kernel.slots import (
+    CURRENT, CURRENT0, CURRENT_SUM, DECAY, DRIVE, END_0, END_1, END_MID, HALF_DECAY, HALF_GAIN, KM, LANES, MEAN_0,
+    MEAN_1, MEAN_DECAY, MEAN_MID, NET, NET_0, NET_MID, Q, Q0, Q_DDOT, Q_DOT, Q_DOT0, Q_DOT_SUM, START_R, STRIDE, U,
+)  # fmt: skip
+from elbow_gym.kernel.template import template
+from elbow_gym.kernel.winding import warm
+
+
+@template
+def exponential_first(ws, n, step):
+    """Stage 1, which keeps the state that the step starts from.
+
+    Reads: Q, Q_DOT, CURRENT, Q_DDOT, HALF_DECAY, HALF_GAIN.
+    Writes: Q, Q_DOT, CURRENT, Q0, Q_DOT0, CURRENT0, Q_DOT_SUM, NET_0.
+    """
+    half = step / 2.0
+    for a in range(n):
+        here = U(a * STRIDE)
+        for k in range(LANES):
+            net = net_voltage(ws, here, k, step / 6.0, half, 1)
+            q_dot = ws[here + Q_DOT + k]
+            i = ws[here + CURRENT + k]
+            q_ddot = ws[here + Q_DDOT + k]
+            ws[here + Q0 + k] = ws[here + Q + k]
+            ws[here + Q_DOT0 + k] = q_dot
+            ws[here + CURRENT0 + k] = i
+            ws[here + NET_0 + k] = net
+            ws[here + Q_DOT_SUM + k] = step / 6.0 * q_ddot
+            ws[here + Q + k] += half * q_dot
+            ws[here + Q_DOT + k] = q_dot + half * q_ddot
+            ws[here + CURRENT + k] = ws[here + HALF_DECAY + k] * i + ws[here + HALF_GAIN + k] * net
+    turn_plane(ws)
+
+
+@template
+def exponential_second(ws, n, step):
+    """Stage 2, at half a step.
+
+    Reads: Q_DOT, CURRENT, Q0, Q_DOT0, CURRENT0, Q_DOT_SUM, Q_DDOT, HALF_DECAY, HALF_GAIN.
+    Writes: Q, Q_DOT, CURRENT, Q_DOT_SUM, CURRENT_SUM, NET_MID.
+    """
+    half = step / 2.0
+    for a in range(n):
+        here = U(a * STRIDE)
+        for k in range(LANES):
+            net = net_voltage(ws, here, k, step / 3.0, half, 2)
+            q_ddot = ws[here + Q_DDOT + k]
+            ws[here + NET_MID + k] = net
+            ws[here + CURRENT_SUM + k] = ws[here + CURRENT + k]
+            ws[here + Q_DOT_SUM + k] += step / 3.0 * q_ddot
+            ws[here + Q + k] = ws[here + Q0 + k] + half * ws[here + Q_DOT + k]
+            ws[here + Q_DOT + k] = ws[here + Q_DOT0 + k] + half * q_ddot
+            ws[here + CURRENT + k] = (
+                ws[here + HALF_DECAY + k] * ws[here + CURRENT0 + k] + ws[here + HALF_GAIN + k] * net
+            )
+    turn_plane(ws)
+
+
+@template
+def exponential_third(ws, n, step):
+    """Stage 3, at half a step; the next one is at its end, with the current that makes Simpson's mean the true one.
+
+    Reads: Q_DOT, CURRENT, Q0, Q_DOT0, CURRENT0, Q_DOT_SUM, CURRENT_SUM, KM, Q_DDOT, MEAN_DECAY, MEAN_0, MEAN_MID,
+        MEAN_1, NET_0, NET_MID.
+    Writes: Q, Q_DOT, CURRENT, Q_DOT_SUM, NET_MID.
+    """
+    for a in range(n):
+        here = U(a * STRIDE)
+        for k in range(LANES):
+            net = net_voltage(ws, here, k, step / 3.0, step, 3)
+            q_dot = ws[here + Q_DOT + k]
+            q_ddot = ws[here + Q_DDOT + k]
+            i0 = ws[here + CURRENT0 + k]
+            middle = 0.5 * (ws[here + NET_MID + k] + net)
+            late = ws[here + Q_DOT0 + k] + step * q_ddot
+            mean = ws[here + MEAN_DECAY + k] * i0 + (
+                (ws[here + MEAN_0 + k] * ws[here + NET_0 + k] + ws[here + MEAN_MID + k] * middle)
+                + ws[here + MEAN_1 + k] * (net + ws[here + KM + k] * (q_dot - late))
+            )
+            ws[here + NET_MID + k] = middle
+            ws[here + Q_DOT_SUM + k] += step / 3.0 * q_ddot
+            ws[here + Q + k] = ws[here + Q0 + k] + step * q_dot
+            ws[here + Q_DOT + k] = late
+            ws[here + CURRENT + k] = 6.0 * mean - i0 - 2.0 * (ws[here + CURRENT_SUM + k] + ws[here + CURRENT + k])
+    turn_plane(ws)
+
+
+@template
+def exponential_fourth(ws, n, step):
+    """Stage 4, whose next state is the step's end.
+
+    Reads: Q, Q_DOT, Q0, Q_DOT0, CURRENT0, Q_DOT_SUM, Q_DDOT, DECAY, END_0, END_MID, END_1, NET_0, NET_MID.
+    Writes: Q, Q_DOT, CURRENT.
+    """
+    for a in range(n):
+        here = U(a * STRIDE)
+        for k in range(LANES):
+            net = net_voltage(ws, here, k, step / 6.0, step, 4)
+            q_dot = ws[here + Q_DOT + k]
+            q0 = ws[here + Q0 + k]
+            q_dot0 = ws[here + Q_DOT0 + k]
+            gained = ws[here + Q_DOT_SUM + k]
+            end = q_dot0 + (gained + step / 6.0 * ws[here + Q_DDOT + k])
+            # The angle's own increment, out of what the stages left behind: one row less to keep.
+            shift = step * q_dot0
+            turned = (shift + step * gained) - (ws[here + Q + k] - q0 - shift) * (1.0 / 3.0)
+            ws[here + Q + k] = q0 + (turned - step / 6.0 * (q_dot - q_dot0))
+            ws[here + Q_DOT + k] = end
+            ws[here + CURRENT + k] = ws[here + DECAY + k] * ws[here + CURRENT0 + k] + (
+                (ws[here + END_0 + k] * ws[here + NET_0 + k] + ws[here + END_MID + k] * ws[here + NET_MID + k])
+                + ws[here + END_1 + k] * net
+            )
+            close_meters(ws, here, k)
+    turn_plane(ws)
+
+
+@template(inlined=True)
+def net_voltage(ws, here, k, weight, ahead, number):
+    """The net voltage [V] of stage `number`, 1 to 4.
+
+    The coefficients know the resistance at the step's start; what a warm winding has gained since counts as a voltage.
+
+    Reads: CURRENT, NET, START_R.
+    """
+    net = ws[here + NET + k]
+    if DRIVE:
+        i = ws[here + CURRENT + k]
+        net -= (warm(ws, here, k, weight, ahead, number) - ws[here + START_R + k]) * i
+    return net
