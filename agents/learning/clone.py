@@ -20,7 +20,7 @@ from agents.control.trajectory import Trajectory
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.run import machine, versions
 from agents.learning.run_folder import RunFolder
-from agents.workers import Job, Tell, in_processes
+from agents.workers import Job, Tell, compile_before, in_processes
 from elbow_gym.baselines.policy import Policy, PolicyCard
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
@@ -152,6 +152,7 @@ def clone_all(
         else:
             jobs[seed] = Job(partial(_clone_one, settings, trajectory, how, seed, folder, command), how.rounds)
     if jobs:
+        compile_before([settings])
         with tqdm(total=len(jobs) * how.rounds, unit="round", desc="clone") as bar:
             results.update(in_processes(jobs, bar.update))
     return {seed: results[seed] for seed in seeds}

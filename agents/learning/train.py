@@ -12,6 +12,7 @@ from typing import Any
 from agents.learning.checkpoint import load_checkpoint
 from agents.learning.run import Run
 from agents.learning.sac.settings import SACSettings
+from agents.workers import compile_before
 from elbow_gym.task.settings import Settings
 
 SEED_STRIDE = 1_000_000
@@ -118,7 +119,8 @@ def train_all(runs: Sequence[Run], workers: int = 2, resume: bool = False) -> li
         raise ValueError(f"workers must be positive, got {workers}")
     for run in runs:
         run.files.check(run.record(), resume)
-    _compile(runs[0])
+    trained = Settings(**runs[0].environment)
+    compile_before([(trained, runs[0].settings.num_envs), trained])
     if workers == 1 or len(runs) == 1:
         return [train(run, resume, 0) for run in runs]
     from tqdm import tqdm
@@ -134,14 +136,3 @@ def train_all(runs: Sequence[Run], workers: int = 2, resume: bool = False) -> li
         except KeyboardInterrupt:
             pool.shutdown(wait=True, cancel_futures=True)
             raise
-
-
-def _compile(run: Run) -> None:
-    """Has the kernel compiled and cached once, before several processes would do so at the same time."""
-    import numpy as np
-
-    from elbow_gym.vector_env import ElbowArmVectorEnv
-
-    env = ElbowArmVectorEnv(1, **run.environment)
-    env.reset(seed=0)
-    env.step(np.zeros(env.action_space.shape, dtype=np.float32))
