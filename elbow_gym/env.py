@@ -188,8 +188,8 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise
         self._ready = True
         self._viewer.restart()
-        sight = self._episodes.look()
-        return sight.observation[0], single(self._episodes.info(sight))
+        snapshot = self._episodes.observe()
+        return snapshot.observation[0], single(self._episodes.info(snapshot))
 
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One control period. Raises ValueError, with the state untouched, on a wrong shape or NaN."""

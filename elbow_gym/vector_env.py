@@ -157,8 +157,8 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         self._over[chosen] = False
         self._started[chosen] = True
         self._viewer.restart(chosen)
-        sight = self._episodes.look(~chosen)
-        return sight.observation, masked(self._episodes.info(sight), chosen)
+        snapshot = self._episodes.observe(~chosen)
+        return snapshot.observation, masked(self._episodes.info(snapshot), chosen)
 
     def step(
         self, actions: NDArray[np.float32]
@@ -188,9 +188,9 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             # Arms that ended a step ago start anew instead; what they did meanwhile does not count.
             self._episodes.reset(self._generators, waiting)
             self._viewer.restart(waiting)
-            sight = self._episodes.look(~waiting)
-            info = self._episodes.info(sight)
-            outcome.observation[waiting] = sight.observation[waiting]
+            snapshot = self._episodes.observe(~waiting)
+            info = self._episodes.info(snapshot)
+            outcome.observation[waiting] = snapshot.observation[waiting]
             for array in (outcome.reward, outcome.terminated, outcome.truncated):
                 array[waiting] = 0
             for key, rows in outcome.info.items():
@@ -205,9 +205,9 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             final_obs[i] = outcome.observation[i].copy()
         self._episodes.reset(self._generators, over)
         self._viewer.restart(over)
-        sight = self._episodes.look(~over)
-        info = self._episodes.info(sight)
-        outcome.observation[over] = sight.observation[over]
+        snapshot = self._episodes.observe(~over)
+        info = self._episodes.info(snapshot)
+        outcome.observation[over] = snapshot.observation[over]
         final_info: dict[str, Any] = {
             key: np.where(spread(over, rows), rows, np.zeros_like(rows)) for key, rows in outcome.info.items()
         }

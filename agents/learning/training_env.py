@@ -40,7 +40,7 @@ class MeteredVectorEnv(ElbowArmVectorEnv):
             state = self.get_state()
             state["episodes"]["steps"] = np.arange(self.num_envs) * self.settings.horizon // self.num_envs
             self.set_state(state)
-            observation = self.episodes.look().observation
+            observation = self.episodes.observe().observation
         return observation, info
 
     def step(

@@ -19,7 +19,7 @@ Sampler = Callable[[float], float]
 
 CLOCKS: dict[str, Callable[[], float]] = {"cpu": time.process_time, "wall": time.perf_counter}
 TIMESTEP = 0.001
-"""What arms of up to 40 joints may take [s]; a step's cost does not depend on it."""
+"""Length of a step [s] that arms of up to 40 joints allow; a step's cost does not depend on it."""
 BATCH = 1024
 OURS, PAPER = "elbow_gym", "the paper in NumPy"
 EVALUATION, RK4_STEP, EULER_STEP, ENV_STEP = "evaluation", "RK4 step", "Euler step", "env step"

@@ -1,4 +1,4 @@
-"""What an arm works under beyond the paper's model: load, table, friction, heat and supply. All off by default."""
+"""Physics beyond the paper's model: load, table, friction, heat and supply, all off by default."""
 
 from __future__ import annotations
 

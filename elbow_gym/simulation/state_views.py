@@ -1,4 +1,4 @@
-"""What can be read off a batch of arms: read-only views of the running state and of its summary."""
+"""Views of a batch of arms by name: read-only, of the running state and of its summary."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from elbow_gym.task.actuation import Actuation
 from elbow_gym.task.arm_batch import Population
 from elbow_gym.task.circle import Circle, check_reachable
 from elbow_gym.task.reward import Price, early_end
-from elbow_gym.task.sensing import Sensing, Sight, blank
+from elbow_gym.task.sensing import Sensing, Snapshot, blank
 from elbow_gym.task.settings import Settings
 from elbow_gym.task.targets import Targets
 
@@ -191,53 +191,53 @@ class Episodes:
         """
         settings = self.settings
         price = (self.tracking_weight, self.energy_weight, settings.control_frequency, settings.regeneration)
-        sight, voltage = blank(self.num_envs, self._size), np.empty_like(action)
+        snapshot, voltage = blank(self.num_envs, self._size), np.empty_like(action)
         self._steps += 1
         invalid = self.simulator.control_step(
-            (action, voltage, *self._actuated), self._substeps, (*self._observed, price, self._spent, *sight)
+            (action, voltage, *self._actuated), self._substeps, (*self._observed, price, self._spent, *snapshot)
         )
         if invalid < 0:
             self._steps -= 1
             raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
-        self.sensing.complete(sight.observation, waiting)
+        self.sensing.complete(snapshot.observation, waiting)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
         truncated = self._steps >= self._horizon
         if invalid:
             terminated = ~self.simulator.valid
-            self._charge_the_rest(terminated, sight, Price(*price))
+            self._charge_the_rest(terminated, snapshot, Price(*price))
             truncated &= ~terminated
-        info = self.info(sight, voltage)
-        return Outcome(sight.observation, sight.figure("reward"), terminated, truncated, info)
+        info = self.info(snapshot, voltage)
+        return Outcome(snapshot.observation, snapshot.figure("reward"), terminated, truncated, info)
 
-    def _charge_the_rest(self, terminated: NDArray[np.bool_], sight: Sight, price: Price) -> None:
+    def _charge_the_rest(self, terminated: NDArray[np.bool_], snapshot: Snapshot, price: Price) -> None:
         """Puts the worst reward for the remaining time, this step included, in place of the terminated arms'."""
         rest = np.maximum(self.settings.horizon - self._steps + 1, 1)[terminated]
         values = self.population.values
         motors = values["supply_voltage"][terminated], values["armature_resistance"][terminated]
         charge = early_end(self.layout, *motors, price, rest)
-        sight.figure("reward_tracking")[terminated] = charge.tracking
-        sight.figure("reward_energy")[terminated] = charge.energy
-        sight.figure("reward")[terminated] = charge.total
+        snapshot.figure("reward_tracking")[terminated] = charge.tracking
+        snapshot.figure("reward_energy")[terminated] = charge.energy
+        snapshot.figure("reward")[terminated] = charge.total
 
     def angle(self) -> Array:
         """Each target's angle on its circle now [rad], (B,)."""
         return self.targets.angle(self._steps)
 
-    def look(self, resting: NDArray[np.bool_] | None = None) -> Sight:
-        """What is seen of every arm now, between control steps: power and rewards are zero.
+    def observe(self, resting: NDArray[np.bool_] | None = None) -> Snapshot:
+        """Observations of every arm now, between control periods: power and rewards are zero.
 
         Arms of the mask `resting` draw no noise, since they have not been reset.
         """
         price = (0.0, 0.0, 0.0, self.settings.regeneration)
-        sight = blank(self.num_envs, self._size)
-        observed = (*self._observed, price, self._spent, *sight)
+        snapshot = blank(self.num_envs, self._size)
+        observed = (*self._observed, price, self._spent, *snapshot)
         observe.observe(*self.simulator.raw, *observed, 0, self.num_envs)
-        self.sensing.complete(sight.observation, resting)
-        return sight
+        self.sensing.complete(snapshot.observation, resting)
+        return snapshot
 
-    def info(self, sight: Sight, voltage: Array | None = None) -> dict[str, Any]:
+    def info(self, snapshot: Snapshot, voltage: Array | None = None) -> dict[str, Any]:
         """Fresh arrays of the step's figures, one row per arm; without a voltage, of a reset: also what was drawn."""
-        info: dict[str, Any] = dict(zip(INFO_FIGURES, sight.figures, strict=False))
+        info: dict[str, Any] = dict(zip(INFO_FIGURES, snapshot.figures, strict=False))
         info["voltage"] = np.zeros((self.num_envs, self.arm.n_joints)) if voltage is None else voltage
         summary = self.simulator.raw[1].copy()
         info["elbow_force"], info["constraint_residual"] = summary[:, SUMMARY_COLUMNS:], summary[:, RESIDUAL]

@@ -14,7 +14,7 @@ from elbow_gym.parameters import Array
 
 OBSERVATION_VERSION = 1
 LOOKAHEAD = 0.1
-"""How far ahead of time the look-ahead error sees the target [s]."""
+"""Time by which the look-ahead error is ahead of the target [s]."""
 
 
 class Feature(NamedTuple):

@@ -1,4 +1,4 @@
-"""What may differ from arm to arm and is drawn anew at each reset."""
+"""Ranges of an arm's parameters, from which each reset draws."""
 
 from __future__ import annotations
 

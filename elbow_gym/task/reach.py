@@ -1,4 +1,4 @@
-"""Where the hand can get to at all."""
+"""Reach of the hand: how far a point lies outside of it."""
 
 from __future__ import annotations
 

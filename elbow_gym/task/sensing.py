@@ -16,11 +16,11 @@ from elbow_gym.task.observation import ObservationLayout
 from elbow_gym.task.settings import Settings
 
 
-class Sight(NamedTuple):
-    """What is seen of B arms at an instant, and what the control step that ends there is paid."""
+class Snapshot(NamedTuple):
+    """Observations of B arms at an instant, and the metrics and rewards of the control period that ends there."""
 
     observation: NDArray[np.float32]
-    """(B, size), scaled and saturated."""
+    """Observations, scaled and saturated, (B, size)."""
     figures: Array
     """Rows of `FIGURES`: energies [J] and time under the table [s] since the reset, summed over the joints."""
 
@@ -29,9 +29,9 @@ class Sight(NamedTuple):
         return self.figures[FIGURES.index(name)]
 
 
-def blank(num_envs: int, size: int) -> Sight:
-    """A sight of B arms that the kernel is to fill."""
-    return Sight(np.empty((num_envs, size), np.float32), np.empty((len(FIGURES), num_envs)))
+def blank(num_envs: int, size: int) -> Snapshot:
+    """A snapshot of B arms that the kernel is to fill."""
+    return Snapshot(np.empty((num_envs, size), np.float32), np.empty((len(FIGURES), num_envs)))
 
 
 class Sensing:
@@ -79,8 +79,10 @@ class Sensing:
         noise = self._population.values["sensor_noise"]
         noisy = int(layout.slices["target_angle"].start)
         for i in np.flatnonzero(noise > 0.0 if resting is None else (noise > 0.0) & ~resting):
-            heard = observation[i, :noisy] + float(noise[i]) * self._generators[int(i)].standard_normal(noisy)
-            observation[i, :noisy] = np.clip(heard, -layout.high[:noisy], layout.high[:noisy])
+            noisy_observation = observation[i, :noisy] + float(noise[i]) * self._generators[int(i)].standard_normal(
+                noisy
+            )
+            observation[i, :noisy] = np.clip(noisy_observation, -layout.high[:noisy], layout.high[:noisy])
 
     def _quantity(self, name: str) -> Array:
         if name == "contact_force":

@@ -1,4 +1,4 @@
-"""What an environment is asked for: one frozen dataclass, validated once, shared by the single and the batched form."""
+"""Settings of an environment: one frozen dataclass, validated once, shared by the single and the batched form."""
 
 from __future__ import annotations
 

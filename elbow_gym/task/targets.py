@@ -1,4 +1,4 @@
-"""Where the targets of B arms are: each arm's circle or other path, and how fast its target runs along it."""
+"""Targets of B arms: each arm's circle or other path, and how fast its target runs along it."""
 
 from __future__ import annotations
 

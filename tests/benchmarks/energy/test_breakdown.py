@@ -1,4 +1,4 @@
-"""Where the PD's energy goes: the parts are those of laws, and sum to the whole."""
+"""Breakdown of the PD's energy: the parts are those of laws, and sum to the whole."""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""How the kernel is put together: merged globals, names with a digest, and the names of rows without a compiler."""
+"""Templates of the kernel: merged globals, names with a digest, and the names of rows without a compiler."""
 
 import subprocess
 import sys
