@@ -54,6 +54,15 @@ def test_interval_of_few_seeds_is_wider_than_that_of_their_episodes():
 QUICK = [Cell("ppo", 2), Cell("ppo", 2, "shifted"), Cell("computed_torque", 0, "table")]
 
 
+@pytest.fixture(scope="module", autouse=True)
+def two_seeds():
+    """Of each learned controller the first two training seeds are enough here."""
+    shipped = lineup.shipped_seeds
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lineup, "shipped_seeds", lambda name: shipped(name)[:2])
+        yield
+
+
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory):
     folder = tmp_path_factory.mktemp("energy")
