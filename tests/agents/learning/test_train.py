@@ -93,10 +93,15 @@ def cut_down(run, monkeypatch):
             train(run)
 
 
-def assert_goes_on_to_the_same_policy(whole, cut, checkpoint):
-    """A run that was cut off leaves a checkpoint, and resumed becomes the run that was not."""
-    assert [path.name for path in checkpoints(cut.folder)] == [checkpoint]
-    assert train(cut, resume=True)["finished"]
+def assert_goes_on_to_the_same_policy(whole, cut, checkpoint, monkeypatch):
+    """A run that was cut off leaves a checkpoint, goes on from there, and becomes the run that was not cut off."""
+    [left] = checkpoints(cut.folder)
+    assert left.name == f"checkpoint_{checkpoint:012}"
+    seen, on_step = [], Keeper._on_step
+    with monkeypatch.context() as patch:
+        patch.setattr(Keeper, "_on_step", lambda keeper: seen.append(keeper.num_timesteps) or on_step(keeper))
+        assert train(cut, resume=True)["finished"]
+    assert seen[0] == checkpoint + cut.settings.num_envs
     # Steps and figures; seconds differ.
     columns = [[row[:1] + row[3:] for row in evaluations(run.folder)] for run in (whole, cut)]
     np.testing.assert_allclose(*columns, rtol=1e-12)
@@ -107,25 +112,25 @@ def assert_goes_on_to_the_same_policy(whole, cut, checkpoint):
 def test_run_that_was_cut_off_goes_on_to_the_same_policy(done, tmp_path, monkeypatch):
     cut = small_run(tmp_path / "run", checkpoint_seconds=0.0)
     cut_down(cut, monkeypatch)
-    assert_goes_on_to_the_same_policy(done[0], cut, "checkpoint_000000000512")
+    assert_goes_on_to_the_same_policy(done[0], cut, 512, monkeypatch)
 
 
 def test_sac_that_was_cut_off_goes_on_to_the_same_policy(tmp_path, monkeypatch):
     whole, cut = (small_run(tmp_path / name, checkpoint_seconds=0.0, **SAC_KILLED) for name in ("whole", "cut"))
     train(whole)
     cut_down(cut, monkeypatch)
-    assert_goes_on_to_the_same_policy(whole, cut, "checkpoint_000000000600")
+    assert_goes_on_to_the_same_policy(whole, cut, 600, monkeypatch)
 
 
 @pytest.mark.soak
-def test_runs_that_were_killed_go_on_to_the_same_policies(done, tmp_path):
+def test_runs_that_were_killed_go_on_to_the_same_policies(done, tmp_path, monkeypatch):
     whole = small_run(tmp_path / "whole", checkpoint_seconds=0.0, **SAC_KILLED)
     train(whole)
     command = [sys.executable, "-m", "tests.support.trainings", str(tmp_path / "ppo"), str(tmp_path / "sac")]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert ended.stdout.splitlines().count(str(-signal.SIGKILL)) == 2, ended.stderr
-    assert_goes_on_to_the_same_policy(done[0], small_run(tmp_path / "ppo"), "checkpoint_000000000512")
-    assert_goes_on_to_the_same_policy(whole, small_run(tmp_path / "sac", **SAC_KILLED), "checkpoint_000000000600")
+    assert_goes_on_to_the_same_policy(done[0], small_run(tmp_path / "ppo"), 512, monkeypatch)
+    assert_goes_on_to_the_same_policy(whole, small_run(tmp_path / "sac", **SAC_KILLED), 600, monkeypatch)
 
 
 def test_interrupted_run_keeps_its_best_policy_and_goes_on(tmp_path, monkeypatch, capsys):
