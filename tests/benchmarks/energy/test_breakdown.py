@@ -1,4 +1,4 @@
-"""Where the PD's energy goes: the parts are those of laws, and sum to the whole."""
+"""Shares of the PD's energy: each is what it is called, and they sum to the whole."""
 
 from functools import partial
 

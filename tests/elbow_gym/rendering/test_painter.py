@@ -1,4 +1,4 @@
-"""What stands in the pictures: pixels where the projection puts them, colours by force, bars by power."""
+"""Pictures of an arm: pixels where the projection puts them, colours by force, bars by power."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What critics are shown: lengths, small values stretched, and where the hand is heading."""
+"""Inputs of the critics: lengths, small values stretched, and the way that the hand is heading."""
 
 import numpy as np
 import pytest
