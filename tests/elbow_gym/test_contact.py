@@ -146,6 +146,7 @@ def stored_energy(arm, table, state):
     )
 
 
+@pytest.mark.slow
 def test_a_bounce_conserves_energy_but_for_what_friction_contact_and_copper_take():
     arm = small_arm(gear_coulomb_friction=0.002, gear_viscous_friction=1e-4, torque_constant=0.02, rotor_inertia=1e-6)
     table = TableParameters(stiffness=2e4, dissipation=0.5, friction=0.3)
@@ -161,6 +162,7 @@ def test_a_bounce_conserves_energy_but_for_what_friction_contact_and_copper_take
     assert (np.diff(run[:, 10]) >= -1e-12).all()
 
 
+@pytest.mark.slow
 def test_an_elastic_smooth_table_gives_back_all_it_took():
     arm = replace(small_arm(gear_viscous_friction=0.0, torque_constant=1e-9), joint_viscous_friction=(0.0,) * 3)
     table = TableParameters(stiffness=2e4, dissipation=0.0)

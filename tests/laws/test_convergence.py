@@ -21,6 +21,7 @@ def test_halving_the_timestep_divides_the_error_by_sixteen(elbows):
     assert 3.5 < np.log2(coarse / fine) / 2.0 < 4.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n_joints", "elbows"), [(4, ()), (5, (3, 5))])
 def test_runs_converge_to_the_papers_equations_integrated_elsewhere(n_joints, elbows):
     arm = shortened(uneven_arm(), n_joints)

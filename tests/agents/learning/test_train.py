@@ -115,6 +115,7 @@ def test_run_that_was_cut_off_goes_on_to_the_same_policy(done, tmp_path, monkeyp
     assert_goes_on_to_the_same_policy(done[0], cut, 512, monkeypatch)
 
 
+@pytest.mark.slow
 def test_sac_that_was_cut_off_goes_on_to_the_same_policy(tmp_path, monkeypatch):
     whole, cut = (small_run(tmp_path / name, checkpoint_seconds=0.0, **SAC_KILLED) for name in ("whole", "cut"))
     train(whole)

@@ -295,6 +295,7 @@ def test_published_files_are_refreshed_when_asked(written):
         assert (folder / "results" / name).read_bytes() == (folder / "all" / original).read_bytes()
 
 
+@pytest.mark.slow
 def test_runs_in_other_processes_report_their_progress_and_their_errors():
     short = {elbows: reproduce.settings_of(elbows, "24 V", control_frequency=200.0, duration=2.1) for elbows in (2, 0)}
     told = []
@@ -358,6 +359,7 @@ def test_paper_cases_are_as_published(elbows):
     assert_published(direct(elbows, 1e-4, 1000.0), elbows)
 
 
+@pytest.mark.slow
 def test_case_played_in_the_environment_is_the_bare_simulators():
     values = reproduce.play(reproduce.settings_of(2, "paper", control_frequency=2000.0, timestep=5e-4)).values
     values["joint_1"] = values["joint_energy"][0]

@@ -73,6 +73,7 @@ def measured(tmp_path_factory):
     return folder, rows
 
 
+@pytest.mark.slow
 def test_benchmark_writes_tables_figures_and_context(measured):
     folder, rows = measured
     assert [row.regime for row in rows] == ["A", "B", "C", "A", "B", "A", "B", "C"]
@@ -106,6 +107,7 @@ def rows_of(cell, folder, seeds=(20_000, 20_001), fresh=False, tell=lambda _: No
     return energy.rows_of(cell, energy.play(cell, seeds, folder, fresh, tell))
 
 
+@pytest.mark.slow
 def test_interrupted_benchmark_goes_on(measured, monkeypatch):
     folder, rows = measured
     cached = folder / "cache"
@@ -119,6 +121,7 @@ def test_interrupted_benchmark_goes_on(measured, monkeypatch):
         rows_of(QUICK[0], cached)
 
 
+@pytest.mark.slow
 def test_progress_tells_all_of_the_work_once(measured, tmp_path):
     for folder in (tmp_path, measured[0] / "cache"):
         told = []
@@ -126,6 +129,7 @@ def test_progress_tells_all_of_the_work_once(measured, tmp_path):
         assert sum(told) == lineup.work(QUICK[0])
 
 
+@pytest.mark.slow
 def test_cells_sent_to_processes_are_those_played_here(measured, monkeypatch):
     folder, rows = measured
     monkeypatch.setattr(energy, "in_processes", in_this_process)
@@ -134,6 +138,7 @@ def test_cells_sent_to_processes_are_those_played_here(measured, monkeypatch):
     assert energy.measure([20_000, 20_001], lambda _: None, folder / "other") == rows[:3]
 
 
+@pytest.mark.slow
 def test_gap_is_the_excess_over_the_bound_where_there_is_one(measured, monkeypatch):
     cached = measured[0] / "cache"
     monkeypatch.setattr(energy, "cached_bound", lambda _: {"closed_loop": 20.0})
