@@ -116,7 +116,7 @@ def test_the_table_enters_as_its_generalised_torque_alone():
     np.testing.assert_array_equal(on.current_dot, off.current_dot)
 
 
-def bounce(arm, table):
+def bounce(arm, table, until=0.03):
     """Throws the small arm, turning, onto the table: rows of q, q_dot, current and the losses [J] so far."""
     start = np.array([0.0, *lying(arm, 0.002, 0.003)[1:], 2.0, 0.6, 0.2, 0.0, 0.0, 0.0])
 
@@ -132,7 +132,7 @@ def bounce(arm, table):
         return np.concatenate([q_dot, found.q_ddot, found.current_dot, lost])
 
     first = np.concatenate([start, np.zeros(3)])
-    return solve_ivp(rates, (0.0, 0.03), first, method="DOP853", rtol=1e-8, atol=1e-10).y.T
+    return solve_ivp(rates, (0.0, until), first, method="DOP853", rtol=1e-8, atol=1e-10).y.T
 
 
 def stored_energy(arm, table, state):
@@ -146,6 +146,7 @@ def stored_energy(arm, table, state):
     )
 
 
+@pytest.mark.slow
 def test_a_bounce_conserves_energy_but_for_what_friction_contact_and_copper_take():
     arm = small_arm(gear_coulomb_friction=0.002, gear_viscous_friction=1e-4, torque_constant=0.02, rotor_inertia=1e-6)
     table = TableParameters(stiffness=2e4, dissipation=0.5, friction=0.3)
@@ -161,12 +162,16 @@ def test_a_bounce_conserves_energy_but_for_what_friction_contact_and_copper_take
     assert (np.diff(run[:, 10]) >= -1e-12).all()
 
 
+@pytest.mark.slow
 def test_an_elastic_smooth_table_gives_back_all_it_took():
     arm = replace(small_arm(gear_viscous_friction=0.0, torque_constant=1e-9), joint_viscous_friction=(0.0,) * 3)
     table = TableParameters(stiffness=2e4, dissipation=0.0)
-    run = bounce(arm, table)
+    run = bounce(arm, table, until=0.02)
     energies = np.array([stored_energy(arm, table, state) for state in run])
     np.testing.assert_allclose(energies, energies[0], rtol=0.0, atol=1e-7)
+    taken = np.array([contact.contact_energy(arm, table, state[:3]).sum() for state in run])
+    assert taken.max() > 0.01
+    assert taken[-1] == 0.0
     assert not run[:, 10].any()
 
 

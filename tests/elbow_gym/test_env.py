@@ -1,3 +1,5 @@
+"""The single environment: Gymnasium's rules, exact continuation, wrong input, and a reward that is error and power."""
+
 import copy
 import functools
 import itertools

@@ -1,3 +1,5 @@
+"""The vector reward of MO-Gymnasium's conventions, and the scalar one as its weighted sum."""
+
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -1,3 +1,5 @@
+"""The adapter for Stable-Baselines3, against its own vector of single environments."""
+
 import gymnasium as gym
 import numpy as np
 import pytest

@@ -1,3 +1,5 @@
+"""The compliant table's parameters: their forms, and what is refused."""
+
 import json
 import math
 

@@ -1,3 +1,5 @@
+"""The batched environment, bit for bit the single ones, in every autoreset mode."""
+
 import functools
 import itertools
 import re

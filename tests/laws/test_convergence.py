@@ -38,6 +38,7 @@ EXACT_DECAY = [(2e-3, 2e-5, 1e-3)]
 BOTH = [(1e-3, 2e-7, 5e-5), (1e-4, 1e-11, 1e-8)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("integrator", "errors"), [("exponential", EXACT_DECAY + BOTH), ("rk4", BOTH)])
 @pytest.mark.parametrize(("n_joints", "elbows"), [(4, ()), (5, (3, 5))])
 def test_runs_converge_to_the_papers_equations_integrated_elsewhere(n_joints, elbows, integrator, errors):

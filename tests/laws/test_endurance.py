@@ -76,6 +76,7 @@ def lever(sim, arm):
     return min(slope[1:3].max(), slope[3:6].max())
 
 
+@pytest.mark.slow
 def test_a_million_random_and_bang_bang_steps_stay_finite():
     sim = arms(256)
     rng, flagged, pressed = np.random.default_rng(7), 0, 0.0

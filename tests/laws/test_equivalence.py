@@ -1,6 +1,7 @@
 """The compiled recursion equals the paper's equations, derived another way, on any arm of the family."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 
 from elbow_gym import LinkParameters, dynamics
@@ -9,14 +10,25 @@ from tests.support.kernel_calls import accelerations_of
 from tests.support.strategies import between, cases
 
 
-@given(cases())
-@settings(max_examples=150)
-def test_fast_form_equals_the_papers_form(case):
+def assert_equal_to_the_papers_form(case):
     arm, q, q_dot, current, voltage, elbows = case
     assume_solvable(dynamics.mass_matrix(arm, q), dynamics.constraint_jacobian(arm, q, elbows))
     expected = dynamics.forward_dynamics(arm, q, q_dot, current, voltage, elbows)
     for value, reference, tolerance in zip(accelerations_of(case), expected, (1e-10, 1e-10, 1e-13), strict=True):
         assert_close(value, reference, tolerance)
+
+
+@given(cases())
+@settings(max_examples=100)
+def test_fast_form_equals_the_papers_form(case):
+    assert_equal_to_the_papers_form(case)
+
+
+@pytest.mark.soak
+@given(cases())
+@settings(max_examples=2000)
+def test_fast_form_equals_the_papers_form_for_thousands_of_arms(case):
+    assert_equal_to_the_papers_form(case)
 
 
 def extended(case, payload):

@@ -156,6 +156,7 @@ def test_the_papers_arm_lying_flat_rests_on_every_joint_with_a_links_weight():
     assert sim.below_table[0] == 0.0
 
 
+@pytest.mark.slow
 def test_runs_converge_to_the_reference_equations_integrated_elsewhere():
     arm, table = small_arm(), TableParameters(stiffness=2e4, friction=0.3)
     start, q_dot = lying(arm, 0.003, 0.001), np.array([1.0, 0.5, 0.4])

@@ -1,3 +1,5 @@
+"""The environment's page: its tables and lists say what the code has."""
+
 import ast
 import dataclasses
 import inspect

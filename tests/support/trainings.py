@@ -63,11 +63,6 @@ def killed(run):
 
 
 if __name__ == "__main__":
-    # Forked from here, both processes have what takes seconds to load, the last of it with the first optimizer.
-    import stable_baselines3  # noqa: F401
-    import torch.utils.tensorboard
-
-    torch.optim.Adam([torch.nn.Parameter(torch.zeros(1))])
     ppo, sac = map(Path, sys.argv[1:])
     for run in (small_run(ppo, checkpoint_seconds=0.0), small_run(sac, checkpoint_seconds=0.0, **SAC_KILLED)):
         print(killed(run), flush=True)

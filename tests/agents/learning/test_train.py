@@ -1,4 +1,4 @@
-"""Training runs end to end on a small budget, keep the best policy, and survive interruption and kill -9."""
+"""Training runs end to end on a small budget, keep the best policy, and survive interruption and being cut off."""
 
 import csv
 import json
@@ -75,28 +75,63 @@ def test_card_tells_how_it_was_made(done):
     assert np.isfinite(card["evaluation"]["return"])
 
 
-@pytest.fixture(scope="module")
-def killed(tmp_path_factory):
-    """The folders of two runs that were killed with SIGKILL midway, by algorithm."""
-    folders = {name: tmp_path_factory.mktemp("killed") / name for name in ("ppo", "sac")}
-    command = [sys.executable, "-m", "tests.support.trainings", *map(str, folders.values())]
-    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
-    assert ended.stdout.splitlines().count(str(-signal.SIGKILL)) == 2, ended.stderr
-    return folders
+class Killed(BaseException):
+    """Ends a training as SIGKILL does: nothing of it is caught, and nothing more is written."""
+
+
+def ends_after_600_steps(keeper):
+    if keeper.num_timesteps > 600:
+        raise Killed
+    return True
+
+
+def cut_down(run, monkeypatch):
+    """Starts a run whose process goes away midway, as far as its folder can tell."""
+    with monkeypatch.context() as patch:
+        patch.setattr(Keeper, "_on_step", ends_after_600_steps)
+        with pytest.raises(Killed):
+            train(run)
+
+
+def assert_goes_on_to_the_same_policy(whole, cut, checkpoint, monkeypatch):
+    """A run that was cut off leaves a checkpoint, goes on from there, and becomes the run that was not cut off."""
+    [left] = cut.folder.glob("checkpoint_*")
+    assert left.name == f"checkpoint_{checkpoint:012}"
+    seen, on_step = [], Keeper._on_step
+    with monkeypatch.context() as patch:
+        patch.setattr(Keeper, "_on_step", lambda keeper: seen.append(keeper.num_timesteps) or on_step(keeper))
+        assert train(cut, resume=True)["finished"]
+    assert seen[0] == checkpoint + cut.settings.num_envs
+    # Steps and figures; seconds differ.
+    columns = [[row[:1] + row[3:] for row in evaluations(run.folder)] for run in (whole, cut)]
+    np.testing.assert_allclose(*columns, rtol=1e-12)
+    for name, uncut in weights(whole.folder).items():
+        np.testing.assert_array_equal(weights(cut.folder)[name], uncut)
+
+
+def test_run_that_was_cut_off_goes_on_to_the_same_policy(done, tmp_path, monkeypatch):
+    cut = small_run(tmp_path / "run", checkpoint_seconds=0.0)
+    cut_down(cut, monkeypatch)
+    assert_goes_on_to_the_same_policy(done[0], cut, 512, monkeypatch)
 
 
 @pytest.mark.slow
-def test_killed_run_goes_on_to_the_same_policy(done, killed):
-    folder = killed["ppo"]
-    assert [path.name for path in folder.glob("checkpoint_*")] == ["checkpoint_000000000512"]
-    result = train(small_run(folder), resume=True)
-    assert result["finished"]
-    assert [row[0] for row in evaluations(folder)] == [0, 256, 512, 768, 1024]
-    np.testing.assert_allclose(
-        [row[3:] for row in evaluations(folder)], [row[3:] for row in evaluations(done[0].folder)], rtol=1e-12
-    )
-    for name, whole in weights(done[0].folder).items():
-        np.testing.assert_array_equal(weights(folder)[name], whole)
+def test_sac_that_was_cut_off_goes_on_to_the_same_policy(tmp_path, monkeypatch):
+    whole, cut = (small_run(tmp_path / name, checkpoint_seconds=0.0, **SAC_KILLED) for name in ("whole", "cut"))
+    train(whole)
+    cut_down(cut, monkeypatch)
+    assert_goes_on_to_the_same_policy(whole, cut, 600, monkeypatch)
+
+
+@pytest.mark.soak
+def test_runs_that_were_killed_go_on_to_the_same_policies(done, tmp_path, monkeypatch):
+    whole = small_run(tmp_path / "whole", checkpoint_seconds=0.0, **SAC_KILLED)
+    train(whole)
+    command = [sys.executable, "-m", "tests.support.trainings", str(tmp_path / "ppo"), str(tmp_path / "sac")]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert ended.stdout.splitlines().count(str(-signal.SIGKILL)) == 2, ended.stderr
+    assert_goes_on_to_the_same_policy(done[0], small_run(tmp_path / "ppo"), 512, monkeypatch)
+    assert_goes_on_to_the_same_policy(whole, small_run(tmp_path / "sac", **SAC_KILLED), 600, monkeypatch)
 
 
 def test_interrupted_run_keeps_its_best_policy_and_goes_on(tmp_path, monkeypatch, capsys):
@@ -198,18 +233,6 @@ def test_first_policy_is_where_the_training_starts(done, tmp_path):
     wrong = small_run(tmp_path / "wrong", initial_policy=done[0].folder / "best", settings=replace(SMALL, hidden=(9,)))
     with pytest.raises(ValueError, match=r"layers of the first policy must be \(41, 9, 10\) .* got \(41, 8, 10\)"):
         train(wrong)
-
-
-@pytest.mark.slow
-def test_killed_sac_goes_on_to_the_same_policy(killed, tmp_path):
-    whole, cut = small_run(tmp_path / "whole", **SAC_KILLED), small_run(killed["sac"], **SAC_KILLED)
-    train(whole)
-    assert [path.name for path in cut.folder.glob("checkpoint_*")] == ["checkpoint_000000000600"]
-    assert train(cut, resume=True)["finished"]
-    columns = [[row[:1] + row[3:] for row in evaluations(run.folder)] for run in (whole, cut)]
-    np.testing.assert_allclose(*columns, rtol=1e-12)
-    for name, uncut in weights(whole.folder).items():
-        np.testing.assert_array_equal(weights(cut.folder)[name], uncut)
 
 
 def test_sac_checkpoint_holds_the_replay_buffer(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from agents.paper import cases as reproduce
 from agents.paper import claims as verdict
-from agents.paper.figures import draw
+from agents.paper import figures
 from agents.style import ELBOW_COLOURS
 from elbow_gym import Simulator
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
@@ -204,22 +204,52 @@ def written(tmp_path_factory):
     return folder, found
 
 
-@pytest.mark.slow
-def test_all_figures_of_the_paper_are_drawn_in_three_colours(tmp_path):
+KINDS = ("fig01", "fig04", "fig05", "fig06", "fig07", "fig25", "paper_cases")
+"""One figure of each kind; those of the other joints are drawn as joint 1's and 10's are."""
+
+
+def assert_drawn_in_three_colours(path):
     from matplotlib.colors import to_rgb
     from matplotlib.image import imread
 
-    drawn = draw({elbows: synthetic(elbows) for elbows in (2, 1, 0)}, tmp_path)
-    names = sorted(path.name for path in tmp_path.glob("*.png"))
-    assert names == sorted(path.name for path in drawn)
-    assert names == [*(f"fig{number:02d}.png" for number in range(1, 26)), "paper_cases.png"]
-    for name in names:
-        pixels = imread(tmp_path / name)[::2, ::2, :3]
-        assert min(pixels.shape[:2]) > 200
-        # Coinciding curves leave the lower ones an edge of mixed pixels, hence the tolerance.
-        for elbows, colour in ELBOW_COLOURS.items():
-            found = (np.abs(pixels - to_rgb(colour)).max(axis=-1) < 0.1).sum()
-            assert found > 20, (name, elbows, found)
+    pixels = imread(path)[::2, ::2, :3]
+    assert min(pixels.shape[:2]) > 200
+    # Coinciding curves leave the lower ones an edge of mixed pixels, hence the tolerance.
+    for elbows, colour in ELBOW_COLOURS.items():
+        found = (np.abs(pixels - to_rgb(colour)).max(axis=-1) < 0.1).sum()
+        assert found > 20, (path.name, elbows, found)
+
+
+def draw_chosen(folder, monkeypatch, chosen):
+    """Draws figures of made-up runs into a folder: those that are chosen, by name."""
+    every = figures.figures
+
+    def some(cases):
+        for name, figure in every(cases):
+            if name in chosen:
+                yield name, figure
+            else:
+                figures.pyplot().close(figure)
+
+    monkeypatch.setattr(figures, "figures", some)
+    return figures.draw({elbows: synthetic(elbows) for elbows in (2, 1, 0)}, folder)
+
+
+@pytest.mark.slow
+def test_every_kind_of_figure_is_drawn_in_three_colours(tmp_path, monkeypatch):
+    drawn = draw_chosen(tmp_path, monkeypatch, KINDS)
+    assert [path.name for path in drawn] == [f"{name}.png" for name in KINDS]
+    for path in drawn:
+        assert_drawn_in_three_colours(path)
+
+
+@pytest.mark.soak
+def test_all_figures_of_the_paper_are_drawn_in_three_colours(tmp_path, monkeypatch):
+    names = [*(f"fig{number:02d}" for number in range(1, 26)), "paper_cases"]
+    drawn = draw_chosen(tmp_path, monkeypatch, names)
+    assert sorted(path.stem for path in tmp_path.glob("*.png")) == [path.stem for path in drawn] == names
+    for path in drawn:
+        assert_drawn_in_three_colours(path)
 
 
 def test_text_files_are_written_whole(written):
@@ -265,6 +295,7 @@ def test_published_files_are_refreshed_when_asked(written):
         assert (folder / "results" / name).read_bytes() == (folder / "all" / original).read_bytes()
 
 
+@pytest.mark.slow
 def test_runs_in_other_processes_report_their_progress_and_their_errors():
     short = {elbows: reproduce.settings_of(elbows, "24 V", control_frequency=200.0, duration=2.1) for elbows in (2, 0)}
     told = []
@@ -329,6 +360,7 @@ def test_paper_cases_are_as_published(elbows):
     assert_published(direct(elbows, 1e-4, 1000.0), elbows)
 
 
+@pytest.mark.slow
 def test_case_played_in_the_environment_is_the_bare_simulators():
     settings = reproduce.settings_of(2, "paper", control_frequency=2000.0)
     values = reproduce.play(settings).values

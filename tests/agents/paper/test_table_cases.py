@@ -55,6 +55,7 @@ def written(tmp_path_factory):
     return found, runs, folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", PUBLISHED)
 def test_leaning_on_two_joints_costs_what_is_published(written, friction):
     numbers = written[0].numbers[friction]["joints 4 and 7"]
@@ -76,6 +77,7 @@ def test_committed_numbers_are_those_of_the_default_table(arm):
         assert getattr(numbers, column.split()[0]) == pytest.approx(float(row[column]), rel=1e-3), column
 
 
+@pytest.mark.slow
 def test_each_start_leans_on_the_joints_that_it_is_named_after(written):
     for run in written[1].values():
         assert (run.normal_force >= 0.0).all()
@@ -86,12 +88,14 @@ def test_each_start_leans_on_the_joints_that_it_is_named_after(written):
         assert not joint_4[:, 2].any()
 
 
+@pytest.mark.slow
 def test_leaning_saves_energy_under_every_friction(written):
     claims = written[0].claims
     assert [claim.name for claim in claims] == [f"friction {friction:g}" for friction in FRICTIONS]
     assert all(claim.holds for claim in claims)
 
 
+@pytest.mark.slow
 def test_contacts_take_the_work_of_friction_along_joint_7s_way(written):
     for friction, run in written[1].items():
         late = run.time >= 2.0
@@ -105,6 +109,7 @@ def test_contacts_take_the_work_of_friction_along_joint_7s_way(written):
     assert taken > 0.1
 
 
+@pytest.mark.slow
 def test_files_are_written_whole_and_published_when_asked(written):
     found, _, folder = written
     names = ["table_cases.png", "table_numbers.csv", "table_verdict.md"]
@@ -120,6 +125,7 @@ def test_files_are_written_whole_and_published_when_asked(written):
     assert "Start joints 4 and 7: joint 7 for t > 2 s 7.96 / 7.96 / 7.96 N." in text
 
 
+@pytest.mark.slow
 def test_the_picture_shows_every_start(written):
     from matplotlib.colors import to_rgb
     from matplotlib.image import imread

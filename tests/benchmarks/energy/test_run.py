@@ -52,7 +52,16 @@ def test_interval_of_few_seeds_is_wider_than_that_of_their_episodes():
     assert together.high - together.low > 3.0 * (apart.high - apart.low)
 
 
-QUICK = [Cell("ppo", 2), Cell("ppo", 2, "shifted"), Cell("computed_torque", 0, "table")]
+QUICK = [Cell("ppo", 2), Cell("ppo", 2, "shifted"), Cell("ppo", 0, "table")]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def two_seeds():
+    """Of each learned controller the first two training seeds are enough here."""
+    shipped = lineup.shipped_seeds
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lineup, "shipped_seeds", lambda name: shipped(name)[:2])
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +75,7 @@ def measured(tmp_path_factory):
     return folder, rows
 
 
+@pytest.mark.slow
 def test_benchmark_writes_tables_figures_and_context(measured):
     folder, rows = measured
     assert [row.regime for row in rows] == ["A", "B", "C", "A", "B", "A", "B", "C"]
@@ -100,6 +110,7 @@ def rows_of(cell, folder, seeds=(20_000, 20_001), fresh=False, tell=lambda _: No
     return energy.played_rows(cell, Plan([cell], seeds, folder=folder, fresh=fresh), tell)
 
 
+@pytest.mark.slow
 def test_interrupted_benchmark_goes_on(measured, monkeypatch):
     folder, rows = measured
     cached = folder / "cache"
@@ -113,6 +124,7 @@ def test_interrupted_benchmark_goes_on(measured, monkeypatch):
         rows_of(QUICK[0], cached)
 
 
+@pytest.mark.slow
 def test_progress_tells_all_of_the_work_once(measured, tmp_path):
     for folder in (tmp_path, measured[0] / "cache"):
         told = []
@@ -120,12 +132,14 @@ def test_progress_tells_all_of_the_work_once(measured, tmp_path):
         assert sum(told) == lineup.work(QUICK[0])
 
 
+@pytest.mark.slow
 def test_cells_sent_to_processes_are_those_played_here(measured, monkeypatch):
     folder, rows = measured
     monkeypatch.setattr(energy, "in_processes", in_this_process)
     assert energy.measure(Plan(QUICK[:1], [20_000, 20_001], folder=folder / "other")) == rows[:3]
 
 
+@pytest.mark.slow
 def test_gap_is_the_excess_over_the_bound_where_there_is_one(measured, monkeypatch):
     cached = measured[0] / "cache"
     monkeypatch.setattr(energy, "cached_bound", lambda _: {"closed_loop": 20.0})

@@ -1,3 +1,5 @@
+"""Shares of a batch among threads: every arm once, errors passed on, threads that end."""
+
 import gc
 import threading
 

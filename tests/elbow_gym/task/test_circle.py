@@ -1,3 +1,5 @@
+"""The circle as the paper draws it, its JSON form, and its reach."""
+
 import math
 
 import numpy as np

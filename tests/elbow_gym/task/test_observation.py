@@ -1,3 +1,5 @@
+"""The observation's entries, scales and bounds, and the reward's terms, against the simulator's state."""
+
 import math
 from fractions import Fraction
 

@@ -1,3 +1,5 @@
+"""An environment's arguments: what is refused, and how a control period is divided into RK4 steps."""
+
 import dataclasses
 import json
 import math
