@@ -58,9 +58,9 @@ QUICK = [Cell("ppo", 2), Cell("ppo", 2, "shifted"), Cell("ppo", 0, "table")]
 @pytest.fixture(scope="module", autouse=True)
 def two_seeds():
     """Of each learned controller the first two training seeds are enough here."""
-    shipped = lineup.shipped_seeds
+    shipped = players.shipped_seeds
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lineup, "shipped_seeds", lambda name: shipped(name)[:2])
+        patch.setattr(players, "shipped_seeds", lambda name: shipped(name)[:2])
         yield
 
 

@@ -83,6 +83,7 @@ def random_arm(generator):
 
 
 @pytest.mark.parametrize("elbows", ELBOWS)
+@pytest.mark.slow
 def test_no_eigenvalue_of_a_random_arm_is_faster_than_its_rates(elbows):
     # Damping bounds the real parts, the skew coupling the imaginary ones; gravity moves both by its rate at most.
     generator = np.random.default_rng(len(elbows))
@@ -97,6 +98,7 @@ def test_no_eigenvalue_of_a_random_arm_is_faster_than_its_rates(elbows):
 
 
 @pytest.mark.parametrize("elbows", ELBOWS)
+@pytest.mark.slow
 def test_the_papers_motors_reach_half_of_their_rates_and_never_all(elbows):
     generator, arm, rate = np.random.default_rng(5), paper_arm(), rates_of(paper_arm())
     poses = (np.array(arm.nominal_pose), generator.uniform(-math.pi, math.pi, 10))
@@ -106,6 +108,7 @@ def test_the_papers_motors_reach_half_of_their_rates_and_never_all(elbows):
 
 
 @pytest.mark.parametrize("elbows", ELBOWS)
+@pytest.mark.slow
 def test_friction_slows_an_unpowered_arm_at_half_its_rate_or_more(elbows):
     arm = replace(paper_with(torque_constant=1e-9), gravity=0.0)
     generator, rate = np.random.default_rng(6), rates_of(arm)["friction"]
@@ -123,6 +126,7 @@ def test_the_gears_coulomb_friction_adds_its_slope_at_standstill():
 
 @pytest.mark.parametrize("length", [0.3, 0.003])
 @pytest.mark.parametrize("rotor_inertia", [1e-9, 0.000164])
+@pytest.mark.slow
 def test_a_stretched_arm_swings_under_gravity_at_its_rate_at_most_and_a_quarter_at_least(length, rotor_inertia):
     # Without friction the eigenvalues around the upright arm are those of the pendulum's modes.
     link = LinkParameters(length=length, radius=length / 30.0)
