@@ -24,8 +24,9 @@ from elbow_gym.kinematics import elbow_heights, pitches
 from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
+from elbow_gym.simulation.rates import rates
 from elbow_gym.simulation.state_views import Readings
-from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep, rates
+from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep
 from elbow_gym.simulation.thread_pool import Sharing
 
 # A given pose may be off the elbows' plane by this much [m], its rates by this much [m/s].

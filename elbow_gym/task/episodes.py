@@ -14,7 +14,8 @@ from elbow_gym.kernel import observe
 from elbow_gym.kernel.rows import FIGURES, RESIDUAL, SUMMARY_COLUMNS
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.parameters import Array
-from elbow_gym.simulation.step_limit import check_parameters, rates
+from elbow_gym.simulation.rates import rates
+from elbow_gym.simulation.step_limit import check_parameters
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.actuation import Actuation
 from elbow_gym.task.arm_batch import Population
