@@ -3,7 +3,7 @@
 # pyright: basic
 
 from elbow_gym.kernel.dense import cholesky_solve
-from elbow_gym.kernel.elbow_friction import friction_fixed_point
+from elbow_gym.kernel.elbow_friction import friction_fixed_point, measure_jam
 from elbow_gym.kernel.rows import MAXIMUM_ELBOWS
 from elbow_gym.kernel.slots import (
     C3, CR, CZ, D, ER, EZ, FORCES, FREE, GAIN, IR3, IZ3, LANES, NEXT, R, ROTOR, RUBBING, STRIDE, SUMZ, U, W, Y,
@@ -63,6 +63,8 @@ def elbow_forces(ws, shared, n, elbows):
     if RUBBING:
         friction_fixed_point(ws, shared, n, elbows)
     cholesky_solve(shared, lanes, elbows.size)
+    if RUBBING:
+        measure_jam(shared, lanes, elbows.size)
     for j in range(elbows.size):
         y_slot = U(Y + j * W)
         force = FORCES + U(j * W)

@@ -177,7 +177,8 @@ SLIDE_T = SLIDE_R + U(W * MAXIMUM_ELBOWS)
 PUSHING = SLIDE_T + U(W * MAXIMUM_ELBOWS)
 PUSH = PUSHING + U(W * MAXIMUM_ELBOWS)
 PUSH_LIMIT = PUSH + U(W * MAXIMUM_ELBOWS)  # the largest push that friction goes with [N]
-SHARED_ROWS = W * (3 * _MATRIX + 6 * MAXIMUM_ELBOWS + 4)
+JAM = PUSH_LIMIT + U(W)  # largest acceleration of an elbow that its friction falls short of Coulomb's law by [m/s^2]
+SHARED_ROWS = W * (3 * _MATRIX + 6 * MAXIMUM_ELBOWS + 5)
 
 
 def offsets(

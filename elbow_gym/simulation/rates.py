@@ -16,7 +16,8 @@ coupling, and in relative angles the mass matrix is nowhere less than the rotors
     heating        with g = alpha V0^2 / (R C_th), at which a stalled winding warms up: min(sqrt(2 a g), 4 g)
     gravity        sqrt(G l / I) of a link of inertia I about its middle on which the weight G hangs, at most
                    sqrt(sum of G l / J), for each joint the links that it carries
-    speed          sum of the pitch joints' free speeds K V0 / (R D + K^2): how fast the hand can turn
+    speed          sum of the pitch joints' free speeds K V0 / (R D + K^2), or of what stalled motors speed up to in
+                   an hour where that is less: how fast the hand can turn
     whirl          gravity's rate, with the centripetal acceleration s^2 l of the fastest joint's free speed s for g
     table          sqrt(k / m_e) with m_e the mass that a free link opposes to a force on its end, m / 4 where it is
                    thin; sqrt(mu k / m_e) with friction mu above 1
@@ -25,6 +26,8 @@ coupling, and in relative angles the mass matrix is nowhere less than the rotors
     sliding        mu W / (m v_s) of the lightest link, mu^2 W / (m v_s) with mu above 1
     rubbing        the same of rigid elbows, with ELBOW_SPEED for v_s
 
+A state to start from counts with its temperatures, and with its speeds and currents beyond what a run comes to: links
+that whip turn OVERSHOOT times as fast as a free motor, and a reversal at full speed draws 2 V0 / R.
 Multiples are where the energy balance of motors under voltages that jump between +V0 and -V0 is right to 1e-3.
 """
 
@@ -44,6 +47,10 @@ from elbow_gym.simulation.parameter_rows import parameter_rows
 
 Ends = Mapping[str, Array]
 
+# Time in which motors of next to no torque constant come to no speed [s].
+HOUR = 3600.0
+# A joint's speed in a run over its motor's free speed, at most as a rule.
+OVERSHOOT = 3.0
 SMOOTH, CONTACT, ARMATURE, RINGING, GRAVITY, TURN, WHIRL = 2.2, 0.7, 1.4, 0.8, 0.5, 1.0, 2.0
 
 
@@ -56,6 +63,17 @@ class Mechanism(NamedTuple):
     rk4: float | None
     smooth: bool = True
     """Whether it is at work in free motion, which a voltage's jump starts, or only on the table."""
+
+
+class Start(NamedTuple):
+    """States that arms are put in, (B, n) each."""
+
+    q_dot: Array
+    """Rates [rad/s]."""
+    current: Array
+    """Armature currents [A]."""
+    temperature_rise: Array
+    """Of the windings above the ambient [K]."""
 
 
 MECHANISMS = {
@@ -78,7 +96,12 @@ MECHANISMS = {
 
 
 def rates(
-    rows: Array, conditions: Conditions, supply_voltage: ArrayLike | None = None, *, elbows: bool = True
+    rows: Array,
+    conditions: Conditions,
+    supply_voltage: ArrayLike | None = None,
+    *,
+    elbows: bool = True,
+    start: Start | None = None,
 ) -> dict[str, float]:
     """The fastest rates [1/s], by the names of `MECHANISMS`; zero where a mechanism is off.
 
@@ -89,14 +112,18 @@ def rates(
         conditions: what the arms work under.
         supply_voltage: V0 of each arm [V], shape (...); the conditions' own when None.
         elbows: whether there are rigid ones.
+        start: the states that the arms are put in; at rest and cold when None.
     """
     every = rows.reshape(-1, *rows.shape[-2:])
     low, high = _by_name(every.min(axis=0)), _by_name(every.max(axis=0))
     volts = float(np.max(conditions.supply_voltage if supply_voltage is None else supply_voltage))
+    n = rows.shape[-1]
+    given, rise = (np.zeros(n), np.zeros(n)) if start is None else _fastest_and_warmest(start, low, high, volts)
     # What overflows is too fast for any step.
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        found = _motor_rates(low, high, conditions.supply_resistance) | _heat_rates(low, high, volts)
-        found |= _motion_rates(every, low, high, volts) | _contact_rates(every, low, high, volts)
+        found = _motor_rates(low, high, conditions.supply_resistance) | _heat_rates(low, high, volts, rise)
+        speed = np.maximum(_free_speeds(low, high, volts), given)
+        found |= _motion_rates(every, low, high, speed) | _contact_rates(every, low, high, speed)
     found["armature"] += found["supply"]
     if conditions.surface is None:
         found |= dict.fromkeys(("table", "dissipation", "sliding"), 0.0)
@@ -149,13 +176,23 @@ def _motor_rates(low: Ends, high: Ends, supply_resistance: float) -> dict[str, f
     }
 
 
-def _heat_rates(low: Ends, high: Ends, volts: float) -> dict[str, float]:
+def _fastest_and_warmest(start: Start, low: Ends, high: Ends, volts: float) -> tuple[Array, Array]:
+    """Free speeds [rad/s] that the start is worth, and its temperature rises [K], (n,) each."""
+    beyond = np.maximum(0.0, np.abs(start.current).max(axis=0) - 2.0 * volts / low["armature_resistance"])
+    # An inductance can give its energy to the rotor, or to the winding as heat.
+    stored = beyond**2 / low["inverse_inductance"]
+    speed = np.abs(start.q_dot).max(axis=0) + np.sqrt(stored / low["reflected_inertia"])
+    return speed / OVERSHOOT, start.temperature_rise.max(axis=0) + high["heating"] * stored / 2.0
+
+
+def _heat_rates(low: Ends, high: Ends, volts: float, rise: Array) -> dict[str, float]:
     resistance, inverse_inductance = high["armature_resistance"], high["inverse_inductance"]
     growth = high["temperature_coefficient"] * high["heating"] * volts**2
     fed_back = np.sqrt(2.0 * inverse_inductance * growth)
     # At rest under V0 the rise T settles where R (1 + alpha T) T = R_th V0^2.
     over_cooling = np.divide(growth, low["cooling"], out=np.zeros_like(growth), where=low["cooling"] > 0.0)
-    warmest = (1.0 + np.sqrt(1.0 + 4.0 * over_cooling / resistance)) / 2.0
+    settled = (1.0 + np.sqrt(1.0 + 4.0 * over_cooling / resistance)) / 2.0
+    warmest = np.maximum(settled, 1.0 + high["temperature_coefficient"] * rise)
     return {
         "armature": float((resistance * warmest * inverse_inductance).max()),
         "cooling": float(high["cooling"].max()),
@@ -164,15 +201,17 @@ def _heat_rates(low: Ends, high: Ends, volts: float) -> dict[str, float]:
 
 
 def _free_speeds(low: Ends, high: Ends, volts: float) -> Array:
-    """Highest free speed of each pitch joint [rad/s]."""
+    """Highest speed that the motor of each pitch joint comes to free of load [rad/s], zero for the yaw."""
     # K V0 / (R D + K^2) is largest at K = sqrt(R D), or at the end of K's range that is nearest to it.
     braking = low["armature_resistance"] * low["friction"]
     constant = np.clip(np.sqrt(braking), low["joint_torque_constant"], high["joint_torque_constant"])
-    return (volts / (braking / constant + constant))[1:]
+    free = volts / (braking / constant + constant)
+    stalled = high["joint_torque_constant"] * volts / (low["armature_resistance"] * low["reflected_inertia"])
+    return np.fmin(free, HOUR * stalled) * (np.arange(free.size) > 0)
 
 
-def _motion_rates(every: Array, low: Ends, high: Ends, volts: float) -> dict[str, float]:
-    length, mass, _ = _links(every)
+def _motion_rates(every: Array, low: Ends, high: Ends, speed: Array) -> dict[str, float]:
+    length, *_ = _links(every)
     longest, rotors = length.max(axis=0), low["reflected_inertia"][1:]
     # l / (r^2 / 4 + l^2 / 12) is largest at l = sqrt(3) r, or at the end of l's range that is nearest to it.
     radius = np.sqrt(2.0 * (low["axial_inertia"] / low["mass"])[1:])
@@ -185,15 +224,14 @@ def _motion_rates(every: Array, low: Ends, high: Ends, volts: float) -> dict[str
         carried = np.cumsum((pull * longest)[::-1])[::-1]
         return math.sqrt(min(float((pull * lever).max()), float((carried / rotors).sum())))
 
-    speed = _free_speeds(low, high, volts)
     return {
         "gravity": swing(high["gravity"][1:] * beyond),
-        "speed": float(speed.sum()),
+        "speed": float(speed[1:].sum()),
         "whirl": float(speed.max()) * swing(longest * beyond),
     }
 
 
-def _contact_rates(every: Array, low: Ends, high: Ends, volts: float) -> dict[str, float]:
+def _contact_rates(every: Array, low: Ends, high: Ends, speed: Array) -> dict[str, float]:
     length, mass, middle_inertia = _links(every)
     end_mass = low["mass"][1:] / (1.0 + mass * length**2 / (4.0 * middle_inertia)).max(axis=0)
     end_mass[-1] += low["payload"][-1]
@@ -203,7 +241,7 @@ def _contact_rates(every: Array, low: Ends, high: Ends, volts: float) -> dict[st
     weight = shared["gravity"] * (float(high["mass"].sum()) + shared["payload"])
     friction, elbow_friction = high["table_friction"][0], high["elbow_friction"][0]
     table = math.sqrt(shared["stiffness"] * max(1.0, friction) / lightest)
-    impact = longest * float(_free_speeds(low, high, volts).max()) + math.sqrt(shared["gravity"] * longest)
+    impact = longest * float(speed.max()) + math.sqrt(shared["gravity"] * longest)
     sliding = weight / float(low["mass"][1:].min())
     return {
         "table": table,

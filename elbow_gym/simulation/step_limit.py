@@ -15,6 +15,8 @@ MOST_SUBSTEPS = 2000
 """Substeps of a control period at most."""
 GROWTH = (0.6 / SMOOTH, 1.2 / SMOOTH, 1.8 / SMOOTH)
 """First substeps after the voltage's jump, as shares of the longest that the smooth rates allow."""
+ALONE = 0.3 / SMOOTH
+"""Longest control period that a single step covers, as such a share."""
 # What rounding may add to a step or a count of steps.
 HAIR = 1e-9
 
@@ -56,12 +58,11 @@ def schedule(period: float, found: Mapping[str, float], integrator: str) -> Arra
     """
     steps = _steps(found, integrator)
     longest, name = limits(found, integrator)
-    if integrator == "exponential":
-        smooth = min(step for name, step in steps.items() if MECHANISMS[name].smooth)
-        first = np.minimum(np.array(GROWTH) * smooth, longest)
-    else:
-        first = np.zeros(0)
-    first = first[: np.searchsorted(np.cumsum(first), period * (1.0 - HAIR)) + 1]
+    smooth = min(step for name, step in steps.items() if MECHANISMS[name].smooth)
+    growing = integrator == "exponential"
+    first = np.minimum(np.array(GROWTH if growing else ()) * smooth, longest)
+    fewest = 2 if growing and period > ALONE * smooth else 1
+    first = first[: max(fewest, np.searchsorted(np.cumsum(first), period * (1.0 - HAIR)) + 1)]
     left = max(0.0, period - float(first.sum()))
     if left > (MOST_SUBSTEPS - first.size) * longest * (1.0 + HAIR):
         raise ValueError(
@@ -91,10 +92,11 @@ def check_timestep(timestep: float, period: float, found: Mapping[str, float], i
         raise ValueError(f"timestep must be at most {longest:.3g} s, for {_cause(found, name)}, got {timestep}")
 
 
-def check_parameters(step: float, found: Mapping[str, float], integrator: str) -> None:
-    """Raises ValueError unless one arm's own parameters are resolved by the steps of the environment.
+def check_option(option: str, step: float, found: Mapping[str, float], integrator: str) -> None:
+    """Raises ValueError unless what a reset was given is resolved by the steps of the environment.
 
     Args:
+        option: its name.
         step: longest substep in use [s].
         found: rates of the arm [1/s].
         integrator: "exponential" or "rk4".
@@ -102,7 +104,7 @@ def check_parameters(step: float, found: Mapping[str, float], integrator: str) -
     longest, name = limits(found, integrator)
     if step > longest * (1.0 + HAIR):
         raise ValueError(
-            f"options['parameters'] must allow substeps of {step:.3g} s, got {longest:.3g} s at most, for "
+            f"options[{option!r}] must allow substeps of {step:.3g} s, got {longest:.3g} s at most, for "
             f"{_cause(found, name)}"
         )
 

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym.checks import check_entries, check_restorable, require_entries, restore
+from elbow_gym.checks import check_restorable, require_entries, restore
 from elbow_gym.kernel import observe
 from elbow_gym.kernel.rows import FIGURES, RESIDUAL, SUMMARY_COLUMNS
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.parameters import Array
-from elbow_gym.simulation.rates import rates
-from elbow_gym.simulation.step_limit import check_parameters
+from elbow_gym.simulation.rates import Start, rates
+from elbow_gym.simulation.step_limit import check_option
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.actuation import Actuation
 from elbow_gym.task.arm_batch import Population
@@ -23,10 +23,10 @@ from elbow_gym.task.circle import Circle, check_reachable
 from elbow_gym.task.reward import Price, early_end
 from elbow_gym.task.sensing import Sensing, Snapshot, blank
 from elbow_gym.task.settings import Settings
+from elbow_gym.task.start import above_table, checked_state, given_state
 from elbow_gym.task.targets import Targets
 
 RESET_OPTIONS = ("state", "phase", "circle", "parameters")
-STATE_ENTRIES = ("q", "q_dot", "current", "temperature_rise")
 # The last figure is the reward itself.
 INFO_FIGURES = FIGURES[:-1]
 
@@ -126,7 +126,7 @@ class Episodes:
             drawing = [generators[int(i)] for i in chosen]
             self._draw_arms(drawing, chosen, options.get("parameters"))
             if state is not None:
-                self.simulator.check_state(**state, mask=mask)
+                self._check_steps("state", chosen, checked_state(self.simulator, state, mask))
             circles = self.targets.draw(circle, drawing, options.get("phase"))
             self.targets.check(circles)
             if state is None:
@@ -148,14 +148,19 @@ class Episodes:
         values = self.population.draw(generators, given)
         self.actuation.check(values)
         rows = self.population.put(chosen, values)
+        self.simulator.set_parameters(chosen, rows)
         if given is not None:
-            settings = self.settings
-            found = rates(rows, settings.conditions, values["supply_voltage"], elbows=bool(settings.elbow_joints))
-            check_parameters(float(self._substeps.max()), found, settings.integrator)
+            self._check_steps("parameters", chosen)
         if given is not None and "length" in given:
             for arm in self.population.arms(chosen):
                 check_reachable(arm, self.settings.elbow_joints, self.circle)
-        self.simulator.set_parameters(chosen, rows)
+
+    def _check_steps(self, option: str, chosen: NDArray[np.int64], start: Start | None = None) -> None:
+        """Raises ValueError naming the option unless the steps resolve the chosen arms, put in the states given."""
+        settings, rows = self.settings, self.simulator.parameters(chosen)
+        volts = self.population.values["supply_voltage"][chosen]
+        found = rates(rows, settings.conditions, volts, elbows=bool(settings.elbow_joints), start=start)
+        check_option(option, float(self._substeps.max()), found, settings.integrator)
 
     def _given_circle(self, given: object) -> Circle:
         if given is None:
@@ -169,19 +174,20 @@ class Episodes:
     def _draw_pose(
         self, generators: Sequence[np.random.Generator], circles: Sequence[Circle], chosen: NDArray[np.int64]
     ) -> Array:
-        noise, moved = self.settings.start_noise, "length" in self.settings.randomization.ranges
+        settings = self.settings
+        noise, moved = settings.start_noise, "length" in settings.randomization.ranges
         moved = moved or self.population.changed
         q = np.tile(self.pose, (self.num_envs, 1))
         if moved:
             q = self.simulator.on_table(q)
-        if self.settings.start == "on_target":
+        if settings.start == "on_target":
             arms = self.population.arms(chosen) if moved else [self.arm] * len(chosen)
             for i, arm, circle in zip(chosen, arms, circles, strict=True):
                 q[i] = inverse_kinematics(arm, q[i], circle.position(float(circle.phase)))[0]
         if noise > 0.0:
             q[chosen] += noise * np.stack([generator.standard_normal(self.arm.n_joints) for generator in generators])
             q = self.simulator.on_table(q)
-        return q
+        return q if settings.conditions.surface is None else above_table(self.simulator, q)
 
     def step(self, action: Array, waiting: NDArray[np.bool_] | None = None) -> Outcome:
         """One control period under `action`, held and clipped to the supply voltage.
@@ -268,15 +274,3 @@ class Episodes:
         restore(own, state)
         self.actuation.take_values()
         self.sensing.set_noise(everyone, generators)
-
-
-def given_state(state: object) -> dict[str, Any] | None:
-    """The reset option `state` with its names checked."""
-    if state is None:
-        return None
-    if not isinstance(state, Mapping):
-        raise ValueError(f"options['state'] must be a dict, got {state!r}")
-    plain = cast("Mapping[str, Any]", state)
-    check_entries(plain, set(STATE_ENTRIES), "options['state']")
-    require_entries(plain, ("q",), "options['state']")
-    return dict(plain)

@@ -12,16 +12,16 @@ from scipy.integrate import solve_ivp
 from elbow_gym import ArmParameters, LinkParameters, MotorParameters, TableParameters, dynamics, motors, paper_arm
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_table, quantities
-from elbow_gym.simulation.rates import rates, worst_rows
+from elbow_gym.simulation.rates import Start, rates, worst_rows
 
 NUDGE = 1e-6
 ELBOWS = ((), (4,), (4, 7))
 STIFF = {"stiffness": 1e5}
 
 
-def rates_of(arm, elbows=True, **conditions):
+def rates_of(arm, elbows=True, start=None, **conditions):
     under = Conditions(**conditions)
-    return rates(parameter_table(arm, under), under, elbows=elbows)
+    return rates(parameter_table(arm, under), under, elbows=elbows, start=start)
 
 
 def paper_with(**motor):
@@ -320,3 +320,34 @@ def test_rates_at_the_ranges_ends_cover_a_thick_link_that_swings_fastest_between
     assert worst["gravity"] == pytest.approx(nominal["gravity"], rel=1e-9)
     # Whirl has the longest link's length for a lever, too.
     assert worst["whirl"] == pytest.approx(math.sqrt(5.0) * nominal["whirl"], rel=1e-9)
+
+
+def test_a_motor_of_next_to_no_constant_comes_to_no_speed_though_nothing_brakes_it():
+    idle = replace(paper_with(torque_constant=1e-12, gear_viscous_friction=0.0), joint_viscous_friction=(0.0,) * 10)
+    # An hour of K V0 / (R J), for nine pitch joints.
+    hour = 3600.0 * 3e-12 * 24.0 / (1.1 * 0.000164 * 9.0)
+    assert rates_of(idle)["speed"] == pytest.approx(9.0 * hour)
+    strong = replace(idle, motors=(MotorParameters(torque_constant=1.0, gear_viscous_friction=0.0),) * 10)
+    assert rates_of(strong)["speed"] == pytest.approx(9.0 * 24.0 / 3.0)
+
+
+def start_of(q_dot=0.0, current=0.0, rise=0.0):
+    """All of ten joints alike."""
+    return Start(*(np.full((1, 10), value) for value in (q_dot, current, rise)))
+
+
+def test_a_start_counts_with_its_speed_its_current_and_its_warmth_beyond_those_of_a_run():
+    arm, rest = paper_arm(), rates_of(paper_arm(), heat=True)
+    assert rates_of(arm, heat=True, start=start_of(30.0, 43.0, 300.0)) == rest
+    fast = rates_of(arm, heat=True, start=start_of(300.0))
+    assert fast["speed"] == pytest.approx(9.0 * 300.0 / 3.0)
+    assert fast["whirl"] == pytest.approx(rest["whirl"] * 100.0 / (rest["speed"] / 9.0))
+    assert {name for name in rest if fast[name] != rest[name]} == {"speed", "whirl"}
+    # All of an inductance's energy in the rotor, L i^2 = J q_dot^2.
+    driven = rates_of(arm, heat=True, start=start_of(current=-1e3 - 2.0 * 24.0 / 1.1))
+    assert driven["speed"] == pytest.approx(9.0 * math.sqrt(0.0017 / (0.000164 * 9.0)) * 1e3 / 3.0)
+    hot = rates_of(arm, heat=True, start=start_of(rise=1e4))
+    assert hot["armature"] == pytest.approx(1.1 * (1.0 + 0.00393 * 1e4) / 0.0017)
+    # Joints that start fast hit the table fast.
+    falling = rates_of(arm, table=True, start=start_of(300.0))["dissipation"]
+    assert falling > 2.0 * rates_of(arm, table=True)["dissipation"]

@@ -15,7 +15,7 @@ from elbow_gym.simulation.rates import rates
 from elbow_gym.simulation.step_limit import (
     INTEGRATORS,
     MOST_SUBSTEPS,
-    check_parameters,
+    check_option,
     check_timestep,
     limits,
     schedule,
@@ -107,11 +107,18 @@ def test_a_timestep_that_is_too_long_or_too_short_is_refused():
 
 def test_an_arms_own_parameters_that_the_steps_do_not_resolve_are_refused_by_name():
     step = float(schedule(0.02, rates_of(paper_arm()), "exponential").max())
-    check_parameters(step, rates_of(paper_arm()), "exponential")
+    check_option("parameters", step, rates_of(paper_arm()), "exponential")
     stiff = replace(paper_arm(), joint_viscous_friction=(0.5,) * 9 + (5.0,))
     with pytest.raises(
         ValueError,
         match=r"^options\['parameters'\] must allow substeps of 0\.0055 s, got 0\.000638 s at most, for the rate "
         r"'friction' of 3449 1/s",
     ):
-        check_parameters(step, rates_of(stiff), "exponential")
+        check_option("parameters", step, rates_of(stiff), "exponential")
+
+
+def test_a_slow_arms_control_period_takes_two_substeps_unless_one_is_a_small_share_of_its_fastest_time():
+    slow = {**dict.fromkeys(rates_of(paper_arm()), 0.0), "friction": 20.0}
+    assert schedule(0.02, slow, "exponential") == pytest.approx([0.02 / 3.0, 0.04 / 3.0])
+    assert schedule(0.02, slow, "rk4") == pytest.approx([0.02])
+    assert schedule(0.02, {**slow, "friction": 14.0}, "exponential") == pytest.approx([0.02])
