@@ -20,10 +20,10 @@ coupling, and in relative angles the mass matrix is nowhere less than the rotors
                    an hour where that is less: how fast the hand can turn
     whirl          gravity's rate, with the centripetal acceleration s^2 l of the fastest joint's free speed s for g
     table          sqrt(k / m_e) with m_e the mass that a free link opposes to a force on its end, m / 4 where it is
-                   thin; sqrt(mu k / m_e) with friction mu above 1
+                   thin
     dissipation    sqrt(2 c v) times the table's, for an impact at v = s l + sqrt(g l); at least c W / m_e, with W the
                    weight of arm and payload
-    sliding        mu W / (m v_s) of the lightest link, mu^2 W / (m v_s) with mu above 1
+    sliding        mu W / (m v_s) of the lightest link
     rubbing        the same of rigid elbows, with ELBOW_SPEED for v_s
 
 A state to start from counts with its temperatures, and with its speeds and currents beyond what a run comes to: links
@@ -239,8 +239,7 @@ def _contact_rates(every: Array, low: Ends, high: Ends, speed: Array) -> dict[st
     # One table, one gravity and one payload: the same in every entry.
     shared = {name: float(high[name][0]) for name in ("gravity", "payload", "stiffness", "dissipation")}
     weight = shared["gravity"] * (float(high["mass"].sum()) + shared["payload"])
-    friction, elbow_friction = high["table_friction"][0], high["elbow_friction"][0]
-    table = math.sqrt(shared["stiffness"] * max(1.0, friction) / lightest)
+    table = math.sqrt(shared["stiffness"] / lightest)
     impact = longest * float(speed.max()) + math.sqrt(shared["gravity"] * longest)
     sliding = weight / float(low["mass"][1:].min())
     return {
@@ -248,8 +247,8 @@ def _contact_rates(every: Array, low: Ends, high: Ends, speed: Array) -> dict[st
         "dissipation": max(
             table * math.sqrt(2.0 * shared["dissipation"] * impact), shared["dissipation"] * weight / lightest
         ),
-        "sliding": float(friction * max(1.0, friction) / low["friction_velocity"][0]) * sliding,
-        "rubbing": float(elbow_friction * max(1.0, elbow_friction)) / ELBOW_SPEED * sliding,
+        "sliding": float(high["table_friction"][0] / low["friction_velocity"][0]) * sliding,
+        "rubbing": float(high["elbow_friction"][0]) / ELBOW_SPEED * sliding,
     }
 
 

@@ -62,7 +62,7 @@ class Settings:
     table: bool | Mapping[str, Any] | TableParameters = False
     """A compliant table under joints 3..n and the hand: True, or a dict of `TableParameters` fields."""
     elbow_friction: float = 0.0
-    """Coulomb's coefficient of rigid elbows on the table, where they push [-]."""
+    """Coulomb's coefficient of rigid elbows on the table, where they push [-], at most 1."""
     gear_coulomb_friction: float | None = None
     """Coulomb friction of every gear, at the motor shaft [N m]; the arm's own when None."""
     heat: bool = False

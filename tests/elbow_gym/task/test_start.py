@@ -81,8 +81,8 @@ def test_a_given_pose_deeper_than_weight_presses_is_refused_by_name():
     env.reset(options={"state": {"q": flat + np.eye(10)[9] * np.arcsin(0.0043 / 0.3)}})
     with pytest.raises(
         ValueError,
-        match=r"^options\['state'\] q must have joint 11 at most 0\.00441 m deep in the table \(joint 11 is the hand\), "
-        r"got 0\.0045 m$",
+        match=r"^options\['state'\] q must have joint 11 at most 0\.00441 m deep in the table "
+        r"\(joint 11 is the hand\), got 0\.0045 m$",
     ):
         env.reset(options={"state": {"q": flat + np.eye(10)[9] * np.arcsin(0.0045 / 0.3)}})
     deep = ElbowArmEnv(elbows=0, start_noise=0.0)
