@@ -10,7 +10,7 @@ from elbow_gym.kernel.rows import (
 )  # fmt: skip
 from elbow_gym.kernel.sine import sincos
 from elbow_gym.kernel.slots import (
-    AXIAL, AZ, BELOW, CONTACT_LOSS, COPPER, CURRENT, DRIVE, ELECTRICAL, FORCES, FRICTION, JAM, LENGTH, LOWEST_Z,
+    ASTRAY, AXIAL, AZ, BELOW, CONTACT_LOSS, COPPER, CURRENT, DRIVE, ELECTRICAL, FORCES, FRICTION, LENGTH, LOWEST_Z,
     PSI_DOT, Q, Q_DOT, RHO, RUBBING, SHARED_ROWS, SPIN, STIFFNESS, STRIDE, SUMZ, SUPPLY_LOSS, TABLE, TEMPERATURE, U,
     VOLTAGE, W, WORK, YAW_INERTIA, Z,
 )  # fmt: skip
@@ -69,7 +69,7 @@ def scatter(ws, shared, n, lane, elbows, out, summary):
     """Writes a lane back; a state that cannot be represented stays as it was, with VALID at zero.
 
     Reads: Q, Q_DOT, CURRENT, ELECTRICAL, COPPER, FRICTION, WORK, RHO, SUMZ, Z, LOWEST_Z, CONTACT_LOSS, TEMPERATURE,
-        SUPPLY_LOSS, AZ, FORCES, BELOW, JAM.
+        SUPPLY_LOSS, AZ, FORCES, BELOW, ASTRAY.
     """
     k = U(lane)
     valid = True
@@ -99,7 +99,7 @@ def scatter(ws, shared, n, lane, elbows, out, summary):
     summary[HAND + 2] = ws[end + Z]
     summary[LOWEST] = ws[end + LOWEST_Z]
     summary[BELOW_TABLE] += shared[BELOW + k]
-    summary[RESIDUAL] = shared[JAM + k] if RUBBING else 0.0
+    summary[RESIDUAL] = shared[ASTRAY + k]
     for j in range(elbows.size):
         elbow = U((elbows[j] - 2) * STRIDE + lane)
         summary[RESIDUAL] = max(summary[RESIDUAL], abs(ws[elbow + AZ] + ws[elbow + SUMZ]))

@@ -8,7 +8,7 @@ from elbow_gym.kernel.acceleration import accelerate
 from elbow_gym.kernel.block import gather, scatter, workspace
 from elbow_gym.kernel.integration import move
 from elbow_gym.kernel.observe import observe
-from elbow_gym.kernel.slots import BELOW, JAM, LANES, RUBBING, W
+from elbow_gym.kernel.slots import ASTRAY, BELOW, LANES, W
 from elbow_gym.kernel.template import template
 
 
@@ -16,7 +16,7 @@ from elbow_gym.kernel.template import template
 def run(state, parameters, voltage, elbows, steps, summary, first, end):
     """Arms first..end-1 through steps of given lengths; returns the number of those that were not representable.
 
-    Writes: BELOW, JAM.
+    Writes: ASTRAY, BELOW.
     """
     invalid = 0
     n = state.shape[2]
@@ -25,8 +25,7 @@ def run(state, parameters, voltage, elbows, steps, summary, first, end):
         gather(ws, n, start, state[:end], parameters, voltage)
         for k in range(LANES):
             shared[BELOW + k] = 0.0
-            if RUBBING:
-                shared[JAM + k] = 0.0
+            shared[ASTRAY + k] = 0.0
         move(ws, shared, n, elbows, steps)
         accelerate(ws, n, 0.0)
         for lane in range(min(W, end - start)):

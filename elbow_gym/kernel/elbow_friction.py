@@ -7,8 +7,8 @@ import numpy as np
 from elbow_gym.kernel.dense import cholesky_solve, gauss_solve
 from elbow_gym.kernel.rows import ELBOW_SPEED, LARGEST_AMPLIFICATION, MAXIMUM_ELBOWS
 from elbow_gym.kernel.slots import (
-    C3, COUPLING, CR, CZ, D, ELBOW_FRICTION, ER, EZ, FORCES, FREE_RISE, IR3, IZ3, JAM, LANES, LOSS, MATRIX, NEXT, PUSH,
-    PUSHING, PUSH_LIMIT, Q_DOT, R, RHO, RHO_DOT, ROTOR, SLIDE_R, SLIDE_T, STRIDE, TABLE, TWIST, U, W, X, Y,
+    ASTRAY, C3, COUPLING, CR, CZ, D, ELBOW_FRICTION, ER, EZ, FORCES, FREE_RISE, IR3, IZ3, LANES, LOSS, MATRIX, NEXT,
+    PUSH, PUSHING, PUSH_LIMIT, Q_DOT, R, RHO, RHO_DOT, ROTOR, SLIDE_R, SLIDE_T, STRIDE, TABLE, TWIST, U, W, X, Y,
 )  # fmt: skip
 from elbow_gym.kernel.template import template
 
@@ -153,8 +153,8 @@ def measure_jam(shared, lanes, p):
 
     Zero but where friction jams an arm: where the law has no solution, or one without bound.
 
-    Reads: FORCES, COUPLING, PUSH, JAM.
-    Writes: JAM.
+    Reads: FORCES, COUPLING, PUSH, ASTRAY.
+    Writes: ASTRAY.
     """
     for i in range(p):
         for k in range(lanes):
@@ -163,4 +163,4 @@ def measure_jam(shared, lanes, p):
                 force = max(shared[FORCES + U(j * W) + k], 0.0)
                 rise = shared[COUPLING + U((i * MAXIMUM_ELBOWS + j) * W) + k]
                 short += rise * (force - shared[PUSH + U(j * W) + k])
-            shared[JAM + k] = max(shared[JAM + k], abs(short))
+            shared[ASTRAY + k] = max(shared[ASTRAY + k], abs(short))

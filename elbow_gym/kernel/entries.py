@@ -9,8 +9,8 @@ from elbow_gym.kernel.block import gather, scatter, workspace
 from elbow_gym.kernel.integration import evaluate
 from elbow_gym.kernel.projection import project
 from elbow_gym.kernel.slots import (
-    BELOW, CURRENT, DRIVE, FORCES, INVERSE_L, JAM, LANES, LENGTH, NET, Q, Q_DDOT, RESISTANCE, RUBBING, STRIDE,
-    TEMPERATURE, U, W, WARMING,
+    ASTRAY, BELOW, CURRENT, DRIVE, FORCES, INVERSE_L, LANES, LENGTH, NET, Q, Q_DDOT, RESISTANCE, STRIDE, TEMPERATURE,
+    U, W, WARMING,
 )  # fmt: skip
 from elbow_gym.kernel.template import template
 
@@ -19,7 +19,7 @@ from elbow_gym.kernel.template import template
 def refresh(state, parameters, elbows, summary, first, end):
     """Summary of arms first..end-1 at their present state, with no step taken.
 
-    Writes: BELOW, JAM.
+    Writes: ASTRAY, BELOW.
     """
     n = state.shape[2]
     ws, shared = workspace(n)
@@ -28,8 +28,7 @@ def refresh(state, parameters, elbows, summary, first, end):
         gather(ws, n, start, state[:end], parameters, voltage)
         for k in range(LANES):
             shared[BELOW + k] = 0.0
-            if RUBBING:
-                shared[JAM + k] = 0.0
+            shared[ASTRAY + k] = 0.0
         evaluate(ws, shared, n, elbows)
         accelerate(ws, n, 0.0)
         for lane in range(min(W, end - start)):

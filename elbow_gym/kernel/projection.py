@@ -5,7 +5,7 @@
 from elbow_gym.kernel.rows import NEWTON_STEPS, SMALL_SHIFT
 from elbow_gym.kernel.sine import sincos
 from elbow_gym.kernel.slots import (
-    ACTIVE, ER, GRAM, HEIGHT, LANES, LENGTH, NEXT, OMEGA, PHI, Q, Q_DOT, RATE, SHIFT, STRIDE, U,
+    ACTIVE, DRIFT, ER, GRAM, HEIGHT, LANES, LENGTH, NEXT, OMEGA, PHI, Q, Q_DOT, RATE, SHIFT, STRIDE, U,
 )  # fmt: skip
 from elbow_gym.kernel.template import template
 
@@ -16,8 +16,8 @@ def projection_step(ws, shared, elbows):
 
     All elbows lie at z = 0, so the links between two neighbours close on their own and no matrix is solved.
 
-    Reads: Q, Q_DOT, LENGTH, PHI, OMEGA, ER, HEIGHT, RATE, GRAM, SHIFT, ACTIVE.
-    Writes: Q, Q_DOT, PHI, OMEGA, ER, HEIGHT, RATE, GRAM, SHIFT, ACTIVE.
+    Reads: Q, Q_DOT, LENGTH, PHI, OMEGA, ER, HEIGHT, RATE, GRAM, SHIFT, ACTIVE, DRIFT.
+    Writes: Q, Q_DOT, PHI, OMEGA, ER, HEIGHT, RATE, GRAM, SHIFT, ACTIVE, DRIFT.
     """
     lanes = min(LANES, U(ws.size))
     first = 1
@@ -48,6 +48,7 @@ def projection_step(ws, shared, elbows):
                 ws[here + ER + k] = ls
         here = U(last * STRIDE)
         for k in range(lanes):
+            shared[DRIFT + k] = max(shared[DRIFT + k], shared[ACTIVE + k] * abs(ws[here + RATE + k]))
             scale = shared[ACTIVE + k] / ws[here + GRAM + k]
             height = ws[here + HEIGHT + k] * scale
             rate = ws[here + RATE + k] * scale
@@ -86,11 +87,12 @@ def project(ws, shared, elbows):
     upright it takes more. A lane stops by its own shift, so its bits do not depend on its neighbours'.
 
     Reads: ACTIVE.
-    Writes: ACTIVE.
+    Writes: ACTIVE, DRIFT.
     """
     lanes = min(LANES, U(ws.size))
     for k in range(lanes):
         shared[ACTIVE + k] = 1.0
+        shared[DRIFT + k] = 0.0
     for _ in range(NEWTON_STEPS):
         projection_step(ws, shared, elbows)
         moving = 0.0

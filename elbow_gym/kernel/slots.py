@@ -166,7 +166,9 @@ FORCES = U(W * _MATRIX)  # elbow forces [N]
 BELOW = U(W * (_MATRIX + MAXIMUM_ELBOWS))  # time below the table [s]
 SHIFT = BELOW + U(W)  # largest shift of a projection step [rad/m]
 ACTIVE = SHIFT + U(W)  # 1 while the projection goes on
-PLAIN_SHARED_ROWS = W * (_MATRIX + MAXIMUM_ELBOWS + 3)
+DRIFT = ACTIVE + U(W)  # largest vertical speed of an elbow after a step, which the projection takes [m/s]
+ASTRAY = DRIFT + U(W)  # largest vertical acceleration of an elbow that its force or its step left [m/s^2]
+PLAIN_SHARED_ROWS = W * (_MATRIX + MAXIMUM_ELBOWS + 5)
 # Where elbows rub: the matrix again, what friction adds to it [1/kg], the free accelerations [m/s^2], friction per
 # newton of each elbow's force, radial and tangential [-], 1 for the elbows that push, and how hard they do [N].
 MATRIX = U(PLAIN_SHARED_ROWS)
@@ -177,8 +179,7 @@ SLIDE_T = SLIDE_R + U(W * MAXIMUM_ELBOWS)
 PUSHING = SLIDE_T + U(W * MAXIMUM_ELBOWS)
 PUSH = PUSHING + U(W * MAXIMUM_ELBOWS)
 PUSH_LIMIT = PUSH + U(W * MAXIMUM_ELBOWS)  # the largest push that friction goes with [N]
-JAM = PUSH_LIMIT + U(W)  # largest acceleration of an elbow that its friction falls short of Coulomb's law by [m/s^2]
-SHARED_ROWS = W * (3 * _MATRIX + 6 * MAXIMUM_ELBOWS + 5)
+SHARED_ROWS = W * (3 * _MATRIX + 6 * MAXIMUM_ELBOWS + 6)
 
 
 def offsets(

@@ -23,7 +23,8 @@ coupling, and in relative angles the mass matrix is nowhere less than the rotors
                    thin
     dissipation    sqrt(2 c v) times the table's, for an impact at v = s l + sqrt(g l); at least c W / m_e, with W the
                    weight of arm and payload
-    sliding        mu W / (m v_s) of the lightest link
+    sliding        mu F / (m v_s) of the lightest link, under the weight W or a fifth of the force K V0 / (R l) with
+                   which a stalled motor presses the end of its link, where that is more
     rubbing        the same of rigid elbows, with ELBOW_SPEED for v_s
 
 A state to start from counts with its temperatures, and with its speeds and currents beyond what a run comes to: links
@@ -47,6 +48,8 @@ from elbow_gym.simulation.parameter_rows import parameter_rows
 
 Ends = Mapping[str, Array]
 
+# Share of a motor's force on the end of its link that counts for friction.
+PRESSING = 0.2
 # Time in which motors of next to no torque constant come to no speed [s].
 HOUR = 3600.0
 # A joint's speed in a run over its motor's free speed, at most as a rule.
@@ -123,7 +126,7 @@ def rates(
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         found = _motor_rates(low, high, conditions.supply_resistance) | _heat_rates(low, high, volts, rise)
         speed = np.maximum(_free_speeds(low, high, volts), given)
-        found |= _motion_rates(every, low, high, speed) | _contact_rates(every, low, high, speed)
+        found |= _motion_rates(every, low, high, speed) | _contact_rates(every, low, high, speed, volts)
     found["armature"] += found["supply"]
     if conditions.surface is None:
         found |= dict.fromkeys(("table", "dissipation", "sliding"), 0.0)
@@ -231,7 +234,7 @@ def _motion_rates(every: Array, low: Ends, high: Ends, speed: Array) -> dict[str
     }
 
 
-def _contact_rates(every: Array, low: Ends, high: Ends, speed: Array) -> dict[str, float]:
+def _contact_rates(every: Array, low: Ends, high: Ends, speed: Array, volts: float) -> dict[str, float]:
     length, mass, middle_inertia = _links(every)
     end_mass = low["mass"][1:] / (1.0 + mass * length**2 / (4.0 * middle_inertia)).max(axis=0)
     end_mass[-1] += low["payload"][-1]
@@ -239,9 +242,11 @@ def _contact_rates(every: Array, low: Ends, high: Ends, speed: Array) -> dict[st
     # One table, one gravity and one payload: the same in every entry.
     shared = {name: float(high[name][0]) for name in ("gravity", "payload", "stiffness", "dissipation")}
     weight = shared["gravity"] * (float(high["mass"].sum()) + shared["payload"])
+    stalled = volts * (high["joint_torque_constant"] / low["armature_resistance"])[1:]
+    pressing = max(weight, PRESSING * float((stalled / length.min(axis=0)).max()))
     table = math.sqrt(shared["stiffness"] / lightest)
     impact = longest * float(speed.max()) + math.sqrt(shared["gravity"] * longest)
-    sliding = weight / float(low["mass"][1:].min())
+    sliding = pressing / float(low["mass"][1:].min())
     return {
         "table": table,
         "dissipation": max(

@@ -15,8 +15,8 @@ MOST_SUBSTEPS = 2000
 """Substeps of a control period at most."""
 GROWTH = (0.6 / SMOOTH, 1.2 / SMOOTH, 1.8 / SMOOTH)
 """First substeps after the voltage's jump, as shares of the longest that the smooth rates allow."""
-ALONE = 0.3 / SMOOTH
-"""Longest control period that a single step covers, as such a share."""
+FEW = (0.3 / SMOOTH, 0.9 / SMOOTH)
+"""Longest control periods that one step and two cover, as such shares."""
 # What rounding may add to a step or a count of steps.
 HAIR = 1e-9
 
@@ -61,7 +61,7 @@ def schedule(period: float, found: Mapping[str, float], integrator: str) -> Arra
     smooth = min(step for name, step in steps.items() if MECHANISMS[name].smooth)
     growing = integrator == "exponential"
     first = np.minimum(np.array(GROWTH if growing else ()) * smooth, longest)
-    fewest = 2 if growing and period > ALONE * smooth else 1
+    fewest = 1 + sum(growing and period > share * smooth for share in FEW)
     first = first[: max(fewest, np.searchsorted(np.cumsum(first), period * (1.0 - HAIR)) + 1)]
     left = max(0.0, period - float(first.sum()))
     if left > (MOST_SUBSTEPS - first.size) * longest * (1.0 + HAIR):

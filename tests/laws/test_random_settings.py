@@ -74,13 +74,13 @@ def outcome(seed, on=None, decades=2.0):
             return f"terminated in period {period}"
         # Signs that stay for two periods on average let joints speed up.
         action = np.where(rng.random(action.shape) < 0.5, action, -action)
-        lost = (sim.copper_loss.sum(1) + sim.friction_loss.sum(1) + sim.contact_loss.sum(1))[0]
-        scale = max(info["drawn_energy"] + lost, 1e-9)
-        missing = info["electrical_energy"] - lost - (stored_energy(sim)[0] - before)
-        if abs(missing) > BALANCE * scale:
-            return f"{missing / scale:.1e} of the energy missing in period {period}"
-        if total > price * (before + BALANCE * scale):
-            return f"a return of {total:.3g} from {before:.3g} J"
+    lost = (sim.copper_loss.sum(1) + sim.friction_loss.sum(1) + sim.contact_loss.sum(1))[0]
+    scale = max(info["drawn_energy"] + lost, 1e-9)
+    missing = info["electrical_energy"] - lost - (stored_energy(sim)[0] - before)
+    if abs(missing) > BALANCE * scale:
+        return f"{missing / scale:.1e} of the energy missing"
+    if total > price * (before + BALANCE * scale):
+        return f"a return of {total:.3g} from {before:.3g} J"
     return "right"
 
 
