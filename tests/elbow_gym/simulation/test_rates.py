@@ -351,3 +351,15 @@ def test_a_start_counts_with_its_speed_its_current_and_its_warmth_beyond_those_o
     # Joints that start fast hit the table fast.
     falling = rates_of(arm, table=True, start=start_of(300.0))["dissipation"]
     assert falling > 2.0 * rates_of(arm, table=True)["dissipation"]
+
+
+def test_friction_counts_the_weight_or_a_fifth_of_a_stalled_motors_force_on_the_end_of_its_link():
+    arm, table = paper_arm(), {"friction": 0.3}
+    weight = rates_of(arm, table=table, elbow_friction=0.1)
+    # All weigh 9.81 N on a link of 0.1 kg; a motor presses with 3 * 0.203 * 24 / 1.1 / 0.3 = 44 N.
+    assert weight["sliding"] == pytest.approx(0.3 * 9.81 / (0.1 * 0.01))
+    assert weight["rubbing"] == pytest.approx(0.1 * 9.81 / (0.1 * 0.01))
+    strong = rates_of(arm, table=table, elbow_friction=0.1, supply_voltage=240.0)
+    pressing = 0.2 * 3.0 * 0.203 * 240.0 / 1.1 / 0.3
+    assert strong["sliding"] == pytest.approx(0.3 * pressing / (0.1 * 0.01))
+    assert strong["rubbing"] == pytest.approx(0.1 * pressing / (0.1 * 0.01))

@@ -117,8 +117,9 @@ def test_an_arms_own_parameters_that_the_steps_do_not_resolve_are_refused_by_nam
         check_option("parameters", step, rates_of(stiff), "exponential")
 
 
-def test_a_slow_arms_control_period_takes_two_substeps_unless_one_is_a_small_share_of_its_fastest_time():
+def test_a_slow_arms_control_period_takes_the_more_substeps_the_less_of_its_fastest_time_it_is():
     slow = {**dict.fromkeys(rates_of(paper_arm()), 0.0), "friction": 20.0}
     assert schedule(0.02, slow, "exponential") == pytest.approx([0.02 / 3.0, 0.04 / 3.0])
+    assert schedule(0.02, {**slow, "friction": 46.0}, "exponential") == pytest.approx([0.02 / 6, 0.04 / 6, 0.06 / 6])
     assert schedule(0.02, slow, "rk4") == pytest.approx([0.02])
     assert schedule(0.02, {**slow, "friction": 14.0}, "exponential") == pytest.approx([0.02])
