@@ -38,6 +38,7 @@ def loaded_in_pinocchio(arm):
     return pin, model
 
 
+@pytest.mark.slow
 @given(cases())
 @settings(max_examples=50)
 def test_mujoco_has_the_accelerations_and_current_rates_of_the_file(case):
@@ -53,6 +54,7 @@ def test_mujoco_has_the_accelerations_and_current_rates_of_the_file(case):
         assert difference(data.act_dot, current_dot) < 1e-12
 
 
+@pytest.mark.slow
 @given(cases())
 @settings(max_examples=50)
 def test_pinocchio_has_the_accelerations_of_the_file(case):

@@ -153,6 +153,7 @@ def test_a_rough_gear_at_the_longest_step_that_is_allowed_comes_to_rest():
     assert np.abs(sim.q_dot).max() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("python_kernels")
 @pytest.mark.parametrize("elbows", [1, 2])
 def test_an_arm_slides_less_far_on_rubbing_elbows(elbows):
