@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from elbow_gym.env import ElbowArmEnv
     from elbow_gym.multi_objective import MOElbowArmEnv
     from elbow_gym.parameters import ArmParameters, LinkParameters, MotorParameters, paper_arm
+    from elbow_gym.simulation.options import Conditions
     from elbow_gym.simulator import Simulator
     from elbow_gym.table import TableParameters
     from elbow_gym.task.circle import Circle
@@ -24,6 +25,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "ArmParameters": "parameters",
     "Circle": "task.circle",
+    "Conditions": "simulation.options",
     "ElbowArmEnv": "env",
     "ElbowArmVectorEnv": "vector_env",
     "LinkParameters": "parameters",
@@ -39,6 +41,7 @@ _HOMES = {
 __all__ = [
     "ArmParameters",
     "Circle",
+    "Conditions",
     "ElbowArmEnv",
     "ElbowArmVectorEnv",
     "LinkParameters",

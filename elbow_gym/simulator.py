@@ -22,7 +22,7 @@ from elbow_gym.kernel.rows import (
 from elbow_gym.kernel.slots import BLOCK_LANES
 from elbow_gym.kinematics import elbow_heights, pitches
 from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
-from elbow_gym.simulation.options import Conditions
+from elbow_gym.simulation.options import Conditions, as_conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.simulation.state_views import Readings
 from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep, rates
@@ -40,10 +40,10 @@ class Simulator(Readings):
         arm: an ArmParameters or a preset name.
         elbows: 0, 1, 2 as in the paper, or joint numbers held at z = 0.
         num_envs: B, the number of arms.
+        conditions: payload, compliant table, friction, heat and supply; `Conditions()`, the paper's, when None.
         timestep: length of the steps that `step` takes [s]; refused where it is too long for the arm's fastest rate.
         integrator: "exponential": Runge-Kutta of order 4 with exact decay of the currents; "rk4": the classical method.
         num_threads: threads over which blocks of arms are spread; the results do not depend on it.
-        conditions: fields of `Conditions`: payload, table, elbow_friction, heat, supply_resistance...
 
     Raises ValueError naming the argument.
     """
@@ -54,10 +54,10 @@ class Simulator(Readings):
         elbows: int | tuple[int, ...] = 2,
         num_envs: int = 1,
         *,
+        conditions: Conditions | None = None,
         timestep: float = 0.002,
         integrator: str = "exponential",
         num_threads: int = 1,
-        **conditions: Any,
     ) -> None:
         self.arm = as_arm(arm)
         self.elbows = as_elbows(elbows, self.arm.n_joints)
@@ -65,11 +65,12 @@ class Simulator(Readings):
             raise ValueError(f"elbows must be at most {MAXIMUM_ELBOWS}, got {len(self.elbows)}")
         self.num_envs = positive_integer("num_envs", num_envs)
         self._num_threads = positive_integer("num_threads", num_threads)
-        self.conditions = Conditions(**conditions)
+        self.conditions = as_conditions(conditions)
         self.timestep = positive("timestep", timestep)
         if integrator not in INTEGRATORS:
             raise ValueError(f"integrator must be one of {INTEGRATORS}, got {integrator!r}")
-        found = rates(parameter_table(self.arm, self.conditions), self.conditions, elbows=bool(self.elbows))
+        row = parameter_table(self.arm, self.conditions)
+        found = rates(row, self.conditions, elbows=bool(self.elbows))
         check_timestep(self.timestep, self.timestep, found, integrator)
         self._switches = {
             "table": self.conditions.surface is not None,
@@ -83,7 +84,7 @@ class Simulator(Readings):
         rows = SWITCHED_STATE_ROWS if switched else STATE_ROWS
         self._state = np.zeros((self.num_envs, rows, n))
         self._summary = np.zeros((self.num_envs, SUMMARY_COLUMNS + len(self.elbows)))
-        self._parameters = np.repeat(parameter_table(self.arm, self.conditions)[None], self.num_envs, axis=0)
+        self._parameters = np.repeat(row[None], self.num_envs, axis=0)
         # Timesteps of `step` and control periods since the reset.
         self._clock = np.zeros((self.num_envs, 2), dtype=np.int64)
         self.period = 0.0

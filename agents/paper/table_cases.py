@@ -15,6 +15,7 @@ from agents.paper.figures import SETTLED
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
 from elbow_gym.kinematics import hand_position, inverse_kinematics, joint_positions
 from elbow_gym.parameters import ArmParameters
+from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.settings import Settings
 
@@ -111,7 +112,7 @@ def play_on_table(
     """
     arm, circle, period = settings.parsed_arm, settings.parsed_circle, settings.control_period
     steps = replace(settings, table=table).substeps
-    simulator = Simulator(arm, 0, len(poses), timestep=float(steps.min()), table=table)
+    simulator = Simulator(arm, 0, len(poses), conditions=Conditions(table=table), timestep=float(steps.min()))
     time = np.arange(settings.horizon + 1) * period
     angle = circle.angle(time, 0.0)
     target, velocity = circle.position(angle), circle.velocity(angle)

@@ -47,3 +47,12 @@ class Conditions:
         """Whether motors or supply go beyond the paper's."""
         rough = bool((arm.of_motors("gear_coulomb_friction") > 0.0).any())
         return self.heat or self.supply_resistance > 0.0 or rough
+
+
+def as_conditions(conditions: object) -> Conditions:
+    """The conditions themselves; the paper's from None. Raises ValueError on anything else."""
+    if conditions is None:
+        return Conditions()
+    if not isinstance(conditions, Conditions):
+        raise ValueError(f"conditions must be a Conditions or None, got {conditions!r}")
+    return conditions

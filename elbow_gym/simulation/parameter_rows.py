@@ -17,7 +17,7 @@ from elbow_gym.parameters import (
     cylinder_axial_inertia,
     cylinder_transverse_inertia,
 )
-from elbow_gym.simulation.options import Conditions
+from elbow_gym.simulation.options import Conditions, as_conditions
 from elbow_gym.table import TableParameters
 
 # Less than any V0 I [W] that motors feed back.
@@ -80,5 +80,5 @@ def parameter_rows(
 
 def parameter_table(arm: ArmParameters, conditions: Conditions | None = None) -> Array:
     """The kernel's parameter rows of one arm, shape (PARAMETER_ROWS, n)."""
-    under = Conditions() if conditions is None else conditions
+    under = as_conditions(conditions)
     return parameter_rows(quantities(arm), arm.gravity, under, under.payload, under.supply_voltage)

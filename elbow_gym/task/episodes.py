@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -54,15 +53,14 @@ class Episodes:
         self.arm = settings.parsed_arm
         self.circle = settings.parsed_circle
         """What the targets' circles are drawn from."""
-        conditions = settings.conditions
         self.simulator = Simulator(
             self.arm,
             settings.elbow_joints,
             num_envs,
+            conditions=settings.conditions,
             timestep=float(settings.substeps.min()),
             integrator=settings.integrator,
             num_threads=num_threads,
-            **{field.name: getattr(conditions, field.name) for field in fields(conditions)},
         )
         self.simulator.period = settings.control_period
         self.num_envs = num_envs
@@ -70,7 +68,7 @@ class Episodes:
         self.energy_weight = float(settings.energy_weight)
         self.pose = self.simulator.on_table(self.arm.nominal_pose)[0]
         """Start pose [rad], (n,): the nominal one, on the elbows' plane. Observed angles count from it."""
-        self.population = Population(self.arm, conditions, settings.randomization, num_envs)
+        self.population = Population(self.arm, settings.conditions, settings.randomization, num_envs)
         self.targets = Targets(self.circle, num_envs, settings.control_period)
         self.actuation = Actuation(settings, self.population, num_envs)
         self.sensing = Sensing(settings, self.simulator, self.population, self.actuation.queue)

@@ -14,7 +14,7 @@ from benchmarks.speed import environments, peers
 from benchmarks.speed import own as contenders
 from benchmarks.speed import run as speed
 from benchmarks.speed.rows import Row, ratios
-from elbow_gym import Simulator
+from elbow_gym import Conditions, Simulator
 from elbow_gym.dynamics import forward_dynamics
 
 
@@ -90,7 +90,7 @@ def test_forty_joints_cost_six_times_ten_at_most():
 def test_the_table_costs_six_tenths_more_at_most(num_envs, elbows):
     samplers = []
     for table in (False, True):
-        sim = Simulator("paper", elbows, num_envs, timestep=1e-3, table=table)
+        sim = Simulator("paper", elbows, num_envs, conditions=Conditions(table=table), timestep=1e-3)
         volts = np.random.default_rng(0).uniform(-12.0, 12.0, (num_envs, 10))
         samplers.append(contenders.timed(partial(sim.step, volts, 20), 20 * num_envs))
     without, with_table = np.min([[sampler(0.02) for sampler in samplers] for _ in range(15)], axis=0)
