@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from elbow_gym.baselines.pd import PDController
     from elbow_gym.baselines.policy import load_policy
     from elbow_gym.env import ElbowArmEnv
+    from elbow_gym.interface import Interface
     from elbow_gym.multi_objective import MOElbowArmEnv
     from elbow_gym.parameters import ArmParameters, LinkParameters, MotorParameters, paper_arm
     from elbow_gym.simulation.options import Conditions
@@ -28,6 +29,7 @@ _HOMES = {
     "Conditions": "simulation.options",
     "ElbowArmEnv": "env",
     "ElbowArmVectorEnv": "vector_env",
+    "Interface": "interface",
     "LinkParameters": "parameters",
     "MOElbowArmEnv": "multi_objective",
     "MotorParameters": "parameters",
@@ -44,6 +46,7 @@ __all__ = [
     "Conditions",
     "ElbowArmEnv",
     "ElbowArmVectorEnv",
+    "Interface",
     "LinkParameters",
     "MOElbowArmEnv",
     "MotorParameters",

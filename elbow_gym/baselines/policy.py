@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from elbow_gym.baselines.tasks import task_name
-from elbow_gym.env import ElbowArmEnv
+from elbow_gym.interface import Environment, Interface
 from elbow_gym.task.observation import OBSERVATION_VERSION
 from elbow_gym.task.settings import Settings
-from elbow_gym.vector_env import ElbowArmVectorEnv
 
 BASELINES = Path(__file__).parent / "policies"
 """Folder of the baselines: the best training seed of each algorithm and task, ALGORITHM[_LABEL]_TASK_seedK."""
@@ -96,20 +95,21 @@ class Policy:
         self.card = replace(card, digest=digest)
         self.weights: Weights = dict(weights)
 
-    def check(self, env: ElbowArmEnv | ElbowArmVectorEnv) -> None:
+    def check(self, env: Environment) -> None:
         """Raises ValueError when the environment's observation or action is not the one of the training."""
         if self.card.observation_version != OBSERVATION_VERSION:
             raise ValueError(
                 f"observation_version of the policy must be {OBSERVATION_VERSION}, got {self.card.observation_version}"
             )
-        given = cast("ElbowArmEnv | ElbowArmVectorEnv", env.unwrapped)
-        names = given.observation_names
+        interface = Interface(env)
+        names = interface.layout.names
         if self.card.observation != names:
             raise ValueError(
                 f"observation of the policy must be the environment's {names}, got {self.card.observation}"
             )
+        trained_in = self.settings
         for name in ("elbow_joints", "action_unit", "voltage_limit", "control_frequency"):
-            trained, found = getattr(self.settings, name), getattr(given.settings, name)
+            trained, found = getattr(trained_in, name), getattr(interface.settings, name)
             if trained != found:
                 raise ValueError(f"{name} of the environment must be {trained!r} as in training, got {found!r}")
 
