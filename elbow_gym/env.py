@@ -65,7 +65,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | lookahead_error | 3 | m | 0.5 | 10 | hand minus the target 0.1 s later, along x, y, z |
     | target_angle | 2 | - | 1 | 1 | cosine and sine of the target's angle on the circle |
     | contact_force | n-1, with a table | N | 5 | 10000 | the table's normal force, joints 3 to n and the hand |
-    | temperature_rise | n, with heat | K | 50 | 10000 | of the windings above the ambient |
+    | temperature_rise | n, with heat | K | 50 | 10000 | temperature of the windings above the ambient |
     | pending_voltage | n per period of the longest delay | V | 24 | 10000 | voltages still on their way, newest first |
 
     ## Rewards

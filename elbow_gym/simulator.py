@@ -1,4 +1,4 @@
-"""A batch of arms in time: the only place where public (B, n) arrays meet the compiled kernel."""
+"""Batch of arms in time, the only place where public (B, n) arrays meet the compiled kernel."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ class Simulator(Readings):
             q_dot: rates [rad/s] that keep the elbows on the table to 1e-6 m/s; zero when None.
             current: armature currents [A]; zero when None.
             mask: which arms, shape (B,); all when None.
-            temperature_rise: of the windings above the ambient [K]; zero when None.
+            temperature_rise: temperature of the windings above the ambient [K]; zero when None.
         """
         *given, chosen = self.check_state(q, q_dot, current, mask, temperature_rise)
         # They may be views of the running state, which is zeroed next.
@@ -141,7 +141,7 @@ class Simulator(Readings):
         self._summary[chosen] = 0.0
         self._clock[chosen] = 0
         self._share("refresh", self._state, self._parameters, self._elbow_index, self._summary)
-        # Looking at the other arms' last state again does not make it the outcome of their last step.
+        # A new summary of the other arms' last state does not make it the outcome of their last step.
         self._summary[~chosen, VALID] = valid[~chosen]
 
     def parameters(self, chosen: NDArray[np.int64]) -> Array:
@@ -149,7 +149,7 @@ class Simulator(Readings):
         return self._parameters[chosen]
 
     def set_parameters(self, chosen: NDArray[np.int64], rows: Array) -> None:
-        """Gives some arms other parameter rows, as `tables.parameter_rows` makes them, from now on."""
+        """Gives some arms other parameter rows, as `parameter_rows` makes them, from now on."""
         self._parameters[chosen] = rows
 
     def on_table(self, q: ArrayLike) -> Array:
@@ -233,7 +233,7 @@ class Simulator(Readings):
         Returns:
             The number of arms that are not `valid`; a negative one, with nothing changed, where an action is NaN.
         """
-        # One share looks at its own actions before it moves; several must not move before all are seen.
+        # One share checks its own actions before it moves; several must not move before all are checked.
         if self._num_threads > 1 and np.isnan(actions[0]).any():
             return -1
         own = (self._state, self._parameters, self._elbow_index, steps, self._summary)
@@ -262,11 +262,11 @@ class Simulator(Readings):
         return total
 
     def get_state(self) -> dict[str, NDArray[Any]]:
-        """A copy of everything that runs on; `set_state` continues from it bit for bit."""
+        """A copy of the state, summary and clock; `set_state` continues from it bit for bit."""
         return {"state": self._state.copy(), "summary": self._summary.copy(), "clock": self._clock.copy()}
 
     def set_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Takes a state of `get_state` from a simulator of the same size."""
+        """Restores a state of `get_state` of a simulator of the same size. Raises ValueError on another size."""
         restore({"state": self._state, "summary": self._summary, "clock": self._clock}, state)
 
     @property

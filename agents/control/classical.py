@@ -99,10 +99,10 @@ class _Following(ABC):
         self, observation: NDArray[np.float32], *_args: Any, **_kwargs: Any
     ) -> tuple[NDArray[np.float32], None]:
         """Actions (..., n) for observations (..., size); the first call is the episode's start."""
-        seen = self._interface.decode(observation)
-        q = self._interface.joint_angles(seen)
-        wanted = self._reference.next(self._interface.target_angle(seen), q)
-        voltage = self._voltage(wanted, q, seen["joint_velocity"], seen["current"])
+        observed = self._interface.decode(observation)
+        q = self._interface.joint_angles(observed)
+        wanted = self._reference.next(self._interface.target_angle(observed), q)
+        voltage = self._voltage(wanted, q, observed["joint_velocity"], observed["current"])
         return self._interface.action(voltage), None
 
     @abstractmethod

@@ -52,9 +52,9 @@ class TimeVaryingLQR:
         self, observation: NDArray[np.float32], *_args: Any, **_kwargs: Any
     ) -> tuple[NDArray[np.float32], None]:
         """Actions (..., n) for observations (..., size); the first call is the episode's start."""
-        seen, k = self._interface.decode(observation), self._period
-        q = self._interface.joint_angles(seen)
-        state = np.concatenate([q, seen["joint_velocity"], seen["current"]], axis=-1)
+        observed, k = self._interface.decode(observation), self._period
+        q = self._interface.joint_angles(observed)
+        state = np.concatenate([q, observed["joint_velocity"], observed["current"]], axis=-1)
         voltage = self._voltage[k] - (state - self._states[k]) @ self.gains[k].T
         self._period += 1
         return self._interface.action(voltage), None

@@ -58,7 +58,7 @@ class PDController:
     ) -> tuple[NDArray[np.float32], None]:
         """Actions (..., n) for observations (..., size)."""
         interface = self._interface
-        seen = interface.decode(observation)
-        q_d, q_d_dot = self.desired(interface.target_angle(seen))
-        voltage = self.kp * (q_d - interface.pose - seen["joint_angle"]) + self.kd * (q_d_dot - seen["joint_velocity"])
-        return interface.action(voltage), None
+        observed = interface.decode(observation)
+        q_d, q_d_dot = self.desired(interface.target_angle(observed))
+        lag = q_d - interface.pose - observed["joint_angle"]
+        return interface.action(self.kp * lag + self.kd * (q_d_dot - observed["joint_velocity"])), None

@@ -1,4 +1,4 @@
-"""Arms as the kernel reads them: parameters in rows, and quantities of a batch."""
+"""Rows of an arm's parameters for the kernel, and the quantities that they come from."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def parameter_rows(
     Args:
         values: the entries of `quantities`, each (..., n).
         gravity: g [m/s^2].
-        conditions: what the arms work under, but for the two that may differ between them:
+        conditions: table, friction, heat and supply; payload and supply voltage are given apart.
         payload: mass at the hand [kg], shape (...).
         supply_voltage: V0 [V], shape (...).
     """

@@ -1,4 +1,4 @@
-"""B episodes side by side: the one engine under the single and the batched environment."""
+"""Episodes of B arms side by side, the engine of both the single and the batched environment."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ INFO_FIGURES = FIGURES[:-1]
 
 
 class Outcome(NamedTuple):
-    """What a control step gives, one entry per arm."""
+    """Result of a control period, one entry per arm."""
 
     observation: NDArray[np.float32]
     reward: Array
@@ -44,15 +44,15 @@ class Episodes:
 
     Args:
         settings: the environment's arguments.
-        num_envs: B.
-        num_threads: see `Simulator`.
+        num_envs: B, the number of arms.
+        num_threads: threads over which blocks of arms are spread; the results do not depend on it.
     """
 
     def __init__(self, settings: Settings, num_envs: int = 1, num_threads: int = 1) -> None:
         self.settings = settings
         self.arm = settings.parsed_arm
         self.circle = settings.parsed_circle
-        """What the targets' circles are drawn from."""
+        """Path of the targets, or ranges from which each arm's is drawn at its reset."""
         self.simulator = Simulator(
             self.arm,
             settings.elbow_joints,
@@ -96,7 +96,7 @@ class Episodes:
         return float(self.settings.voltage_limit) / self.highest_action
 
     def target(self) -> Array:
-        """The targets' positions now [m], (B, 3)."""
+        """Present position of each target [m], (B, 3)."""
         return self.targets.position(self.angle())
 
     def reset(
@@ -208,7 +208,7 @@ class Episodes:
         return Outcome(snapshot.observation, snapshot.figure("reward"), terminated, truncated, info)
 
     def _charge_the_rest(self, terminated: NDArray[np.bool_], snapshot: Snapshot, price: Price) -> None:
-        """Puts the worst reward for the remaining time, this step included, in place of the terminated arms'."""
+        """Charges terminated arms the worst reward for the remaining time, this control period included."""
         rest = np.maximum(self.settings.horizon - self._steps + 1, 1)[terminated]
         values = self.population.values
         motors = values["supply_voltage"][terminated], values["armature_resistance"][terminated]
@@ -218,7 +218,7 @@ class Episodes:
         snapshot.figure("reward")[terminated] = charge.total
 
     def angle(self) -> Array:
-        """Each target's angle on its circle now [rad], (B,)."""
+        """Present angle of each target on its path [rad], (B,)."""
         return self.targets.angle(self._steps)
 
     def observe(self, resting: NDArray[np.bool_] | None = None) -> Snapshot:
@@ -234,7 +234,7 @@ class Episodes:
         return snapshot
 
     def info(self, snapshot: Snapshot, voltage: Array | None = None) -> dict[str, Any]:
-        """Fresh arrays of the step's figures, one row per arm; without a voltage, of a reset: also what was drawn."""
+        """Metrics of a control period in new arrays, one row per arm; after a reset (no voltage) also draws."""
         info: dict[str, Any] = dict(zip(INFO_FIGURES, snapshot.figures, strict=False))
         info["voltage"] = np.zeros((self.num_envs, self.arm.n_joints)) if voltage is None else voltage
         summary = self.simulator.raw[1].copy()
@@ -248,13 +248,13 @@ class Episodes:
         return info
 
     def get_state(self) -> dict[str, Any]:
-        """A copy of everything that runs on but the generators."""
+        """A copy of everything that changes from step to step, except the generators."""
         own = {"steps": self._steps.copy(), "spent": self._spent.copy()}
         parts = {"targets": self.targets.get_state(), "parameters": self.population.copy()}
         return {"simulator": self.simulator.get_state(), **parts, "queue": self.actuation.queue.copy(), **own}
 
     def set_state(self, state: Mapping[str, Any], generators: Sequence[np.random.Generator]) -> None:
-        """Takes a state of `get_state` from episodes of the same settings and size, and each arm's generator."""
+        """Restores a state of `get_state` of the same settings and number of arms; takes each arm's generator."""
         own = {"steps": self._steps, "spent": self._spent, "queue": self.actuation.queue}
         require_entries(state, (*own, "simulator", "targets", "parameters"), "state")
         check_restorable(own, state)

@@ -18,9 +18,9 @@ class Targets:
     """One target per arm.
 
     Args:
-        circle: what is drawn from at each reset; the same for all arms unless it is random.
-        num_envs: B.
-        control_period: time between two steps [s].
+        circle: path, or ranges from which one is drawn for each arm at its reset.
+        num_envs: B, the number of arms.
+        control_period: time between two actions [s].
     """
 
     def __init__(self, circle: Circle, num_envs: int, control_period: float) -> None:
@@ -36,7 +36,7 @@ class Targets:
         self._alike = not circle.random
 
     def _pace(self) -> None:
-        """What follows from the rates: how far the targets turn in a control period, and to the look-ahead [rad]."""
+        """Updates the targets' turns in a control period, and to the look-ahead target [rad], each (B,)."""
         self._turn[:], self._lookahead[:] = self._rate * self._period, self._rate * LOOKAHEAD
 
     def draw(self, circle: Circle, generators: Sequence[np.random.Generator], phase: object = None) -> list[Circle]:
@@ -49,7 +49,7 @@ class Targets:
         return [circle.draw(generator) for generator in generators]
 
     def check(self, circles: Sequence[Circle]) -> None:
-        """ValueError when circles do not fit into the batch: all paths have the same number of rows."""
+        """Raises ValueError unless the circles' paths have as many rows as those of the batch."""
         rows = self._path.shape[1]
         for circle in circles:
             if circle.path_rows != rows:
@@ -68,7 +68,7 @@ class Targets:
         return self._phase + self._turn * steps
 
     def arguments(self, steps: NDArray[np.int64]) -> tuple[Array, Array, Array, NDArray[np.int64], Array]:
-        """What the kernel needs of the targets: paths, phases, turns, `steps` and look-aheads.
+        """The kernel's arguments: paths [m], phases, turns [rad], `steps` and look-aheads [rad], one row per arm.
 
         The arrays are this object's own and are brought up to date in place.
         """
@@ -92,12 +92,12 @@ class Targets:
         return self._rate.copy()
 
     def get_state(self) -> dict[str, Any]:
-        """A copy of everything that runs on."""
+        """A copy of the paths, rates, phases and circles of all arms."""
         own = {"path": self._path, "rate": self._rate, "phase": self._phase}
         return {**{name: array.copy() for name, array in own.items()}, "circles": list(self.circles)}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Takes a state of `get_state`. ValueError when it is of another number of arms or shape of path."""
+        """Restores a state of `get_state`. Raises ValueError on another number of arms or of path rows."""
         own = {"path": self._path, "rate": self._rate, "phase": self._phase}
         restore(own, state)
         self._pace()
