@@ -7,6 +7,7 @@ import io
 import json
 import os
 import re
+import shlex
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
@@ -132,6 +133,17 @@ def parse(function: Function, prog: str, words: Sequence[str]) -> Callable[[], A
         if not end.code:
             raise
     _refuse(f"{one_line(said.getvalue())}; see {prog} --help")
+
+
+def spelled(package: str, command: str, words: Sequence[str]) -> str:
+    """The command line as a shell takes it, for the files that a command writes.
+
+    Args:
+        package: what `python -m` runs.
+        command: name of the command.
+        words: the command line after it.
+    """
+    return shlex.join(["python", "-m", package, command, *words])
 
 
 def one_line(box: str) -> str:
