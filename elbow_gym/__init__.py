@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from elbow_gym.baselines.policy import load_policy
     from elbow_gym.env import ElbowArmEnv
     from elbow_gym.interface import Interface
-    from elbow_gym.multi_objective import MOElbowArmEnv
+    from elbow_gym.multi_objective import MOElbowArmEnv, MOElbowArmVectorEnv
     from elbow_gym.parameters import ArmParameters, LinkParameters, MotorParameters, paper_arm
     from elbow_gym.simulation.options import Conditions
     from elbow_gym.simulator import Simulator
@@ -32,6 +32,7 @@ _HOMES = {
     "Interface": "interface",
     "LinkParameters": "parameters",
     "MOElbowArmEnv": "multi_objective",
+    "MOElbowArmVectorEnv": "multi_objective",
     "MotorParameters": "parameters",
     "PDController": "baselines.pd",
     "Simulator": "simulator",
@@ -49,6 +50,7 @@ __all__ = [
     "Interface",
     "LinkParameters",
     "MOElbowArmEnv",
+    "MOElbowArmVectorEnv",
     "MotorParameters",
     "PDController",
     "Simulator",
@@ -99,4 +101,9 @@ for _name, _arguments in (("ElbowArm", {}), ("ElbowArmTable", TABLE), ("ElbowArm
         kwargs=_arguments,
     )
 # Gymnasium's own checker knows scalar rewards only.
-register(id="mo-ElbowArm-v0", entry_point="elbow_gym.multi_objective:MOElbowArmEnv", disable_env_checker=True)
+register(
+    id="mo-ElbowArm-v0",
+    entry_point="elbow_gym.multi_objective:MOElbowArmEnv",
+    vector_entry_point="elbow_gym.multi_objective:MOElbowArmVectorEnv",
+    disable_env_checker=True,
+)

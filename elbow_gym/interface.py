@@ -49,7 +49,7 @@ class Interface:
         """Time between two actions [s]."""
         self.substeps = episodes.settings.substeps
         """Lengths of the simulator's steps in a control period [s]."""
-        self.horizon = episodes.settings.horizon
+        self.horizon = episodes.horizon
         """Number of control periods in an episode."""
         self.voltage_limit = float(episodes.settings.voltage_limit)
         """Nominal supply voltage of every motor [V]."""

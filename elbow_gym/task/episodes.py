@@ -46,9 +46,10 @@ class Episodes:
         settings: the environment's arguments.
         num_envs: B, the number of arms.
         num_threads: threads over which blocks of arms are spread; the results do not depend on it.
+        longest: control periods after which an episode is truncated at the latest; no limit but the duration when None.
     """
 
-    def __init__(self, settings: Settings, num_envs: int = 1, num_threads: int = 1) -> None:
+    def __init__(self, settings: Settings, num_envs: int = 1, num_threads: int = 1, longest: int | None = None) -> None:
         self.settings = settings
         self.arm = settings.parsed_arm
         self.circle = settings.parsed_circle
@@ -73,7 +74,10 @@ class Episodes:
         self.actuation = Actuation(settings, self.population, num_envs)
         self.sensing = Sensing(settings, self.simulator, self.population, self.actuation.queue)
         self.layout = self.sensing.layout
-        self._substeps, self._horizon = settings.substeps, settings.horizon
+        self._substeps = settings.substeps
+        self.horizon = settings.horizon if longest is None else min(settings.horizon, longest)
+        """Control periods after which an episode is truncated."""
+        self._arms_differ, self._circles_differ = bool(settings.randomization.ranges), self.circle.random
         if settings.start == "on_target" and not self.circle.random:
             inverse_kinematics(self.arm, self.pose, self.circle.position(np.linspace(0.0, 2.0 * np.pi, 73)))
         self._steps = np.zeros(num_envs, dtype=np.int64)
@@ -133,11 +137,16 @@ class Episodes:
             self.population.values = before[0]
             self.simulator.set_parameters(chosen, before[1])
             raise
+        self._arms_differ = self._differing()
         self.targets.put(chosen, circles)
         self.actuation.reset(chosen)
         self.sensing.set_noise(chosen, drawing)
         self._steps[chosen] = 0
         self._spent[chosen] = 0.0
+
+    def _differing(self) -> bool:
+        """Whether infos tell the arms' parameters: they are drawn, or some arm was given others than the nominal."""
+        return bool(self.population.randomization.ranges) or self.population.changed
 
     def _draw_arms(self, generators: Sequence[np.random.Generator], chosen: NDArray[np.int64], given: Any) -> None:
         if given is None and not self.population.randomization.ranges and not self.population.changed:
@@ -199,7 +208,7 @@ class Episodes:
             raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
         self.sensing.complete(snapshot.observation, waiting)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
-        truncated = self._steps >= self._horizon
+        truncated = self._steps >= self.horizon
         if invalid:
             terminated = ~self.simulator.valid
             self._charge_the_rest(terminated, snapshot, Price(*price))
@@ -233,18 +242,21 @@ class Episodes:
         self.sensing.complete(snapshot.observation, resting)
         return snapshot
 
-    def info(self, snapshot: Snapshot, voltage: Array | None = None) -> dict[str, Any]:
-        """Metrics of a control period in new arrays, one row per arm; after a reset (no voltage) also draws."""
+    def info(self, snapshot: Snapshot, command: Array | None = None) -> dict[str, Any]:
+        """Metrics of a control period and draws in new arrays, one row per arm; after a reset without a command."""
         info: dict[str, Any] = dict(zip(INFO_FIGURES, snapshot.figures, strict=False))
-        info["voltage"] = np.zeros((self.num_envs, self.arm.n_joints)) if voltage is None else voltage
+        if command is None:
+            command = np.zeros((self.num_envs, self.arm.n_joints))
+        info["voltage"] = command.copy() if self.sensing.silent else self.sensing.terminal_voltage(command)
+        info["voltage_command"] = command
         summary = self.simulator.raw[1].copy()
         info["elbow_force"], info["constraint_residual"] = summary[:, SUMMARY_COLUMNS:], summary[:, RESIDUAL]
-        info.update(self.sensing.info())
-        if voltage is None:
-            if self.population.randomization.ranges or self.population.changed:
-                info["parameters"] = self.population.copy()
-            if self.circle.random:
-                info["circle"] = self.targets.figures()
+        if not self.sensing.silent:
+            info.update(self.sensing.info())
+        if self._arms_differ:
+            info["parameters"] = self.population.copy()
+        if self._circles_differ:
+            info["circle"] = self.targets.figures()
         return info
 
     def get_state(self) -> dict[str, Any]:
@@ -265,6 +277,7 @@ class Episodes:
         restore(own, state)
         self.actuation.take_values()
         self.sensing.set_noise(everyone, generators)
+        self._arms_differ = self._differing()
 
 
 def given_state(state: object) -> dict[str, Any] | None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from elbow_gym.kernel.rows import FIGURES
+from elbow_gym.motors import terminal_voltage
 from elbow_gym.parameters import Array
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.arm_batch import Population
@@ -55,6 +56,10 @@ class Sensing:
             "temperature_rise": n if settings.heat else 0,
             "pending_voltage": n * (queue.shape[1] - 1),
         }
+        self.silent = not (
+            settings.heat or settings.conditions.surface or settings.elbow_friction or settings.supply_resistance
+        )
+        """Whether infos hold nothing of switched-on features, and the motors get the voltages that are asked for."""
         self._switched = [name for name, size in sizes.items() if size]
         self.layout = ObservationLayout(n, sizes)
         """The observation's entries, those of the switched-on features included."""
@@ -88,6 +93,14 @@ class Sensing:
         if name == "contact_force":
             return self._simulator.contact_force[..., 2]
         return self._simulator.temperature_rise if name == "temperature_rise" else self._queue[:, :-1]
+
+    def terminal_voltage(self, command: Array) -> Array:
+        """A fresh array of the voltages at the motors' terminals now [V], (B, n), under a command [V], (B, n)."""
+        settings = self._settings
+        if settings.supply_resistance == 0.0:
+            return command.copy()
+        supply = self._population.values["supply_voltage"], settings.supply_resistance, settings.regeneration
+        return terminal_voltage(command, self._simulator.current, *supply)
 
     def info(self) -> dict[str, Any]:
         """Entries of infos from the switched-on features by name, new arrays with one row per arm."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,8 @@ class Targets:
         self._path = np.repeat(first.path[None], num_envs, axis=0)
         self._rate = np.full(num_envs, first.rate)
         self._phase = np.zeros(num_envs)
+        self._radius, self._circle_period = np.empty(num_envs), np.empty(num_envs)
+        self._measure(range(num_envs))
         self._turn, self._lookahead = np.empty(num_envs), np.empty(num_envs)
         self._pace()
         self._alike = not circle.random
@@ -38,6 +40,14 @@ class Targets:
     def _pace(self) -> None:
         """Updates the targets' turns in a control period, and to the look-ahead target [rad], each (B,)."""
         self._turn[:], self._lookahead[:] = self._rate * self._period, self._rate * LOOKAHEAD
+
+    def _measure(self, chosen: Iterable[int]) -> None:
+        """Radii and periods of the chosen arms' circles, for infos."""
+        for i in chosen:
+            self._radius[i], self._circle_period[i] = (
+                np.asarray(self.circles[i].radius),
+                np.asarray(self.circles[i].period),
+            )
 
     def draw(self, circle: Circle, generators: Sequence[np.random.Generator], phase: object = None) -> list[Circle]:
         """New circles, each by its arm's generator, which start at `phase` [rad] if it is given.
@@ -61,6 +71,7 @@ class Targets:
             self._alike = self._alike and bool((circle.path == self.circles[0].path).all())
             self.circles[int(i)] = circle
             self._path[i], self._rate[i], self._phase[i] = circle.path, circle.rate, float(circle.phase)
+        self._measure(map(int, chosen))
         self._pace()
 
     def angle(self, steps: NDArray[np.int64]) -> Array:
@@ -102,14 +113,15 @@ class Targets:
         restore(own, state)
         self._pace()
         self.circles = list(state["circles"])
+        self._measure(range(len(self.circles)))
         self._alike = bool((self._path == self._path[0]).all())
 
     def figures(self) -> dict[str, Array]:
         """Centre [m] (B, 3), radius [m], period [s], phase [rad] and signed rate [rad/s] of each circle, (B,)."""
         return {
             "center": self._path[:, 0].copy(),
-            "radius": np.array([circle.radius for circle in self.circles], dtype=np.float64),
-            "period": np.array([circle.period for circle in self.circles], dtype=np.float64),
+            "radius": self._radius.copy(),
+            "period": self._circle_period.copy(),
             "phase": self._phase.copy(),
             "rate": self._rate.copy(),
         }

@@ -2,14 +2,17 @@
 
 import csv
 import inspect
+import itertools
 import json
 import math
 import re
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import elbow_gym
 from agents.__main__ import app as agents_app
 from agents.learning.presets import default_settings
 from agents.style import CONTROLLER_NAMES
@@ -219,6 +222,41 @@ def test_infos_of_the_environment_are_documented():
     table = PAGES["elbow_gym/README.md"].split("| info |")[1].split("\n\n")[0]
     named = {name for line in table.splitlines()[2:] for name in re.findall(r"`(\w+)`", cells(line)[0])}
     assert named - {"circle"} == set(env.reset(seed=0)[1])
+
+
+def test_front_of_the_objectives_is_that_of_the_committed_optima():
+    head, _, *lines = block("elbow_gym/README.md", "front")
+    assert cells(head)[:2] == ["elbows", "energy_weight"]
+    optima = {
+        (row["elbows"], row["energy_weight"]): row
+        for row in rows(RESULTS / "optimal.csv")
+        if row["start"] == "paper" and row["under"] == "False"
+    }
+    found = {}
+    for line in lines:
+        elbows, weight, error, power = cells(line)
+        row = optima.pop((elbows, weight))
+        # 250 control periods of 0.02 s.
+        assert float(error) == pytest.approx(-250.0 * float(row["error_mean"]), rel=1e-3)
+        assert float(power) == pytest.approx(-50.0 * float(row["energy"]), rel=1e-4)
+        found.setdefault(elbows, []).append((float(error), float(power)))
+    assert not optima
+    for points in found.values():
+        assert len(points) > 1
+        assert all((a[0] - b[0]) * (a[1] - b[1]) < 0.0 for a, b in itertools.combinations(points, 2))
+
+
+def test_reference_point_of_the_hypervolume_is_worse_than_doing_nothing_and_than_the_pd():
+    quoted = re.search(r"the hypervolume is \((-?\d+), (-?\d+)\)", PAGES["elbow_gym/README.md"]).groups()
+    error, power = map(float, quoted)
+    for elbows in (0, 1, 2):
+        arms = elbow_gym.MOElbowArmVectorEnv(8, elbows=elbows)
+        arms.reset(seed=0)
+        idle = sum(arms.step(np.zeros(arms.action_space.shape))[1] for _ in range(arms.settings.horizon))
+        assert (idle > (error, power)).all()
+        pd = energy()[PD, elbows, "A"]
+        assert -50.0 * float(pd["electrical_energy [J]"]) > power
+        assert -0.25 * float(pd["error_mean [mm]"]) > error
 
 
 def test_training_defaults_are_the_presets():
