@@ -208,13 +208,17 @@ def _integer(rule: str, least: int) -> PrimitiveConstructorSpec[int]:
     )
 
 
+JSON_RULE = "a JSON object such as '{\"duration\": 10}'"
+
+
 def _json_object(words: list[str]) -> dict[str, Any]:
     try:
         plain = json.loads(words[0])
     except json.JSONDecodeError as error:
-        raise ValueError(f"must be a JSON object, got {words[0]} ({error})") from error
+        after = f", which is no JSON from character {error.pos + 1} on"
+        raise ValueError(f"must be {JSON_RULE}, got {words[0]}{after}") from error
     if not isinstance(plain, dict):
-        raise ValueError(f"must be a JSON object, got {words[0]}")
+        raise ValueError(f"must be {JSON_RULE}, got {words[0]}")
     return plain
 
 

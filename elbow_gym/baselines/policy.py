@@ -168,6 +168,14 @@ def load_policy(source: str | Path, elbows: int | None = None, env: str | None =
         ValueError: there is no such policy, or its files do not fit each other.
     """
     if elbows is None and env is None:
+        counts = sorted(
+            name.removeprefix(f"{source}_elbows") for name in baseline_names() if f"{source}_elbows" in name
+        )
+        if counts and not pair(Path(source))[0].is_file():
+            known = f"elbows={' or elbows='.join(counts)}"
+            raise ValueError(
+                f"elbows or env must be given for the baselines {str(source)!r}, such as {known}, got neither"
+            )
         return read_policy(Path(source))
     return read_policy(baseline_path(f"{source}_{task_name(env or 'ElbowArm-v0', elbows)}"))
 
