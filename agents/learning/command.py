@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import shlex
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
 from dataclasses import dataclass, field, fields, replace
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 import tyro
 from tyro.conf import OmitArgPrefixes, subcommand
 
-from agents.cli import Count, JsonObject, Seed
+from agents.cli import Count, JsonObject, Seed, spelled
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.presets import ALGORITHMS, default_settings
 from agents.learning.settings import AlgorithmSettings
@@ -120,7 +119,7 @@ def train_command(words: Sequence[str]) -> Callable[..., None]:
         from agents.learning.evaluation import sentence
         from agents.learning.train import train_all
 
-        runs = runs_of(task, run, algorithm, _spelled("train", words))
+        runs = runs_of(task, run, algorithm, spelled("agents", "train", words))
         names = " to ".join(dict.fromkeys((runs[0].name, runs[-1].name)))
         print(f"{names}, into {run.output}: {algorithm}", flush=True)
         for result in train_all(runs, run.workers, run.resume):
@@ -149,7 +148,7 @@ def clone_command(words: Sequence[str]) -> Callable[..., None]:
         settings = Settings(elbows=teacher.elbows)
         folders = [run.output / f"clone_elbows{teacher.elbows}_seed{seed}" for seed in run.all]
         source = OPTIMA / f"elbows{teacher.elbows}.npz" if teacher.trajectory is None else teacher.trajectory
-        command = _spelled("clone", words)
+        command = spelled("agents", "clone", words)
         results = clone_all(settings, source, imitation, list(run.all), folders, command, run.resume)
         for result in results.values():
             print(f"{result['name']}: {result['training_seconds']:.0f} s, return {result['best']['return']:.2f}")
@@ -214,8 +213,3 @@ def _named_task(words: Sequence[str]) -> str:
 
 def _first_line(documented: Any) -> str:
     return documented.__doc__.split("\n")[0]
-
-
-def _spelled(command: str, words: Sequence[str]) -> str:
-    """The command line as a shell takes it, for the cards of policies."""
-    return shlex.join(["python", "-m", "agents", command, *words])

@@ -58,10 +58,10 @@ SMOOTH, CONTACT, ARMATURE, RINGING, GRAVITY, TURN, WHIRL = 2.2, 0.7, 1.4, 0.8, 0
 
 
 class Mechanism(NamedTuple):
-    """What makes a rate, and the multiples that rate times step may reach, by integrator; None where it is exact."""
+    """Cause of a rate, and the largest rate times step [-] by integrator; None where the integrator is exact."""
 
     constants: str
-    """Formula of the parameters behind it."""
+    """Formula of the rate in parameters, for messages."""
     exponential: float | None
     rk4: float | None
     smooth: bool = True

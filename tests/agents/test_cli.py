@@ -97,7 +97,10 @@ def test_help_of_a_command_joins_the_lines_of_an_argument(app, capsys):
         (["add", "--first", "-1"], "--first must be an integer of at least 0, got -1; see program add --help"),
         (["add", "--first", "1", "--count", "0"], "--count must be a positive integer, got 0; see program add --help"),
         (["add", "--first", "1", "--count", "x"], "--count must be a positive integer, got x; see program add --help"),
-        (["add", "--first", "1", "--more", "[]"], "--more must be a JSON object, got []; see program add --help"),
+        (
+            ["add", "--first", "1", "--more", "[]"],
+            "--more must be a JSON object such as '{\"duration\": 10}', got []; see program add --help",
+        ),
         (
             ["add", "--first", "1", "--sign", "times"],
             "invalid choice 'times' for argument '--sign'. Expected one of ('plus', 'minus'); see program add --help",

@@ -6,7 +6,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from elbow_gym import ElbowArmEnv, Simulator, TableParameters, contact
+from elbow_gym import Conditions, ElbowArmEnv, Simulator, TableParameters, contact
 from elbow_gym.kernel.rows import PARAMETERS
 from tests.support.arms import inductor_energy, mechanical_energy, started, uneven_arm
 from tests.support.random_settings import draw
@@ -42,9 +42,9 @@ def stored_energy(sim):
 
 
 def test_stored_energy_is_that_of_the_printed_equations_and_zero_in_an_arm_that_hangs():
-    sim = Simulator(uneven_arm(), 0, timestep=1e-4, table=True)
+    sim = Simulator(uneven_arm(), 0, conditions=Conditions(table=True), timestep=1e-4)
     started(sim)
-    hanging = Simulator(uneven_arm(), 0, timestep=1e-4, table=True)
+    hanging = Simulator(uneven_arm(), 0, conditions=Conditions(table=True), timestep=1e-4)
     hanging.reset(np.pi * np.eye(10)[1])
     depth = np.cumsum(sim.arm.of_links("length")[1:])
     elastic = TableParameters().stiffness * (depth**2).sum() / 2.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, Simulator, contact, kinematics, paper_arm
+from elbow_gym import Conditions, ElbowArmEnv, ElbowArmVectorEnv, Simulator, contact, kinematics, paper_arm
 from elbow_gym.simulator import PLANE_TOLERANCE
 from elbow_gym.task.start import above_table
 
@@ -41,7 +41,7 @@ def test_poses_above_the_table_start_as_they_do_without_one():
 
 
 def test_a_low_link_is_turned_until_its_end_lies_on_the_table_and_the_others_keep_their_pitch():
-    sim = Simulator("paper", 0, table=True, timestep=5e-4)
+    sim = Simulator("paper", 0, conditions=Conditions(table=True), timestep=5e-4)
     q = np.array(paper_arm().nominal_pose)
     # Link 3 comes down to joint 4, which is at z = 0: steeper, it ends below.
     q[2] += 0.1
@@ -56,7 +56,7 @@ def test_a_low_link_is_turned_until_its_end_lies_on_the_table_and_the_others_kee
 
 
 def test_windings_of_an_angle_are_kept():
-    sim = Simulator("paper", 0, table=True, timestep=5e-4)
+    sim = Simulator("paper", 0, conditions=Conditions(table=True), timestep=5e-4)
     q = np.array(paper_arm().nominal_pose)
     q[2] += 0.1
     wound = q.copy()
@@ -65,7 +65,7 @@ def test_windings_of_an_angle_are_kept():
 
 
 def test_rigid_elbows_stay_at_zero_while_joints_between_them_are_raised():
-    sim = Simulator("paper", (4, 7), 8, table=True, timestep=5e-4)
+    sim = Simulator("paper", (4, 7), 8, conditions=Conditions(table=True), timestep=5e-4)
     q = sim.on_table(paper_arm().nominal_pose + 0.1 * np.random.default_rng(0).normal(size=(8, 10)))
     assert heights(sim.arm, q).min() < -0.01
     raised = above_table(sim, q)
