@@ -1,4 +1,4 @@
-"""Commands of the agents: `python -m agents reproduce | train | clone | publish | evaluate | watch | report`."""
+"""Commands of the agents: `python -m agents COMMAND`."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-from agents.cli import Commands, Count, Seed
+from agents.cli import Commands, Count, JsonObject, Seed
 
 app = Commands("python -m agents", "Controllers of the arm: training, evaluation, pictures, the paper's results.")
+
+NOTHING: dict[str, object] = {}
 
 
 @app.command
@@ -98,6 +100,40 @@ def evaluate(
         results = in_all_regimes(player, seeds, advance)
     elbow_joints = player.settings.elbow_joints
     print_results(f"{player.label}, elbows {elbow_joints}, {episodes} episodes: mean ± standard deviation", results)
+
+
+@app.command
+def bound(
+    elbows: tuple[int, ...] = (2,),
+    circle: JsonObject = NOTHING,
+    payload: float = 0.0,
+    start: Literal["paper", "on_target"] = "paper",
+    pose: tuple[float, ...] | None = None,
+    weights: tuple[float, float] = (1.0, 0.001),
+    environment: JsonObject = NOTHING,
+    under_table: bool | None = None,
+    fresh: bool = False,
+    output: Path | None = None,
+) -> None:
+    """Finds the best known solution of any task without contact, with its certificate; solved tasks are kept.
+
+    Args:
+        elbows: Number of elbows on the table, up to 2, or joint numbers held at z = 0.
+        circle: Fields of the circle, or points of a path as its "shape".
+        payload: Mass at the hand [kg].
+        start: Start pose: "paper" for the arm's nominal one, "on_target" for one whose hand is on the circle.
+        pose: Nominal pose of the arm in place of its own [rad].
+        weights: Cost per metre of tracking error and per watt of electrical power.
+        environment: Other arguments of the environment, such as "arm", "duration" or "voltage_limit".
+        under_table: Whether joints may go below z = 0; only with two or more elbows, where they hardly do, when None.
+        fresh: Whether tasks that were solved before are left aside.
+        output: File for the trajectory, .npz.
+    """
+    from agents.optimal.command import settings_of, solve_and_print
+
+    more = {"circle": circle, "payload": payload, "start": start, **environment}
+    above_table = None if under_table is None else not under_table
+    solve_and_print(settings_of(elbows, weights, pose, more), above_table, fresh, output)
 
 
 @app.command

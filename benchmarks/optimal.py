@@ -17,8 +17,11 @@ from typing import Any
 
 from agents.control.trajectory import Trajectory
 from agents.files import write_csv, write_text
-from agents.optimal.bound import Optimum, SolveError, optimum, posture_guesses
-from agents.optimal.collocation import Problem
+from agents.optimal.certificate import Optimum
+from agents.optimal.guesses import posture_guesses
+from agents.optimal.problem import Problem
+from agents.optimal.search import certified
+from agents.optimal.solution import SolveError
 from agents.shipped import OPTIMA
 from agents.workers import compile_before
 from benchmarks.machine import machine, versions
@@ -111,10 +114,10 @@ def solve_cell(cell: Cell, optima: Path) -> str | None:
         if cell.under or not guesses:
             guesses |= posture_guesses(cell.problem)
         # The front's cells have the default's mesh, which was refined there.
-        found = optimum(cell.problem, guesses, say, refine=cell.energy_weight == DEFAULT_WEIGHT)
+        found, _ = certified(cell.problem, guesses, say, refine=cell.energy_weight == DEFAULT_WEIGHT)
     except (SolveError, ValueError, ArithmeticError) as error:
         return str(error)
-    save(cell, found, optima)
+    save(cell, found.optimum, optima)
     return None
 
 

@@ -33,9 +33,10 @@ class InverseDynamics:
     Args:
         arm: the arm.
         elbows: joint numbers held at z = 0.
+        payload: point mass at the hand [kg].
     """
 
-    def __init__(self, arm: ArmParameters, elbows: Sequence[int] = ()) -> None:
+    def __init__(self, arm: ArmParameters, elbows: Sequence[int] = (), payload: float = 0.0) -> None:
         n = arm.n_joints
         self.arm, self.elbows = arm, tuple(elbows)
         self.torque_constant = arm.of_motors("joint_torque_constant")
@@ -51,6 +52,8 @@ class InverseDynamics:
         self._yaw, self._base = np.eye(n)[:, :1], np.eye(n)[:1]
         # Row k: how far along each link the centre of mass of link k lies.
         lever = np.tril(np.ones((n, n)), -1) * length + np.diag(length / 2.0)
+        # The payload is the last link's end: a whole length along every link, and nothing that turns.
+        lever, mass = np.vstack([lever, length]), np.append(mass, payload)
         self._coupling = lever.T @ (mass[:, None] * lever)
         transverse, axial = arm.of_links("transverse_inertia"), arm.of_links("axial_inertia")
         self._transverse, self._difference = np.diag(transverse), np.diag(transverse - axial)

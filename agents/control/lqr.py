@@ -73,7 +73,8 @@ def linearised_periods(settings: Settings, trajectory: Trajectory) -> tuple[Arra
     size = 4 * n
     nudge = np.concatenate([np.eye(size), -np.eye(size)]) * STEP
     steps = settings.substeps
-    simulator = Simulator(arm, elbows, 2 * size, timestep=float(steps.min()), integrator=settings.integrator)
+    step, conditions = float(steps.min()), settings.conditions
+    simulator = Simulator(arm, elbows, 2 * size, conditions=conditions, timestep=step, integrator=settings.integrator)
     states, inputs = [], []
     for q, q_dot, current, voltage in zip(
         trajectory.q[:-1], trajectory.q_dot[:-1], trajectory.current[:-1], trajectory.voltage, strict=True

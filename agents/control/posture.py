@@ -54,6 +54,7 @@ def best_postures(
     above_table: bool = True,
     starts: int = 12,
     seed: int = 0,
+    payload: float = 0.0,
 ) -> list[Posture]:
     """Local minima of the static copper loss over the joints 2..n-2, the best first.
 
@@ -66,6 +67,7 @@ def best_postures(
         above_table: whether every joint and the hand must have z >= 0.
         starts: searches, one from the arm's nominal pose and the others from normal noise about it.
         seed: seed of the noise.
+        payload: point mass at the hand [kg].
 
     Raises:
         ValueError: no search found a posture that meets its conditions.
@@ -78,7 +80,7 @@ def best_postures(
     target = circle.position(2.0 * np.pi / CIRCLE_POINTS * np.arange(CIRCLE_POINTS))
     wanted = np.stack([np.hypot(target[:, 0], target[:, 1]), target[:, 2]], axis=-1)
     free = np.array([k for k in range(2, n + 1) if k + 1 not in elbows])
-    inverse = InverseDynamics(arm, elbows)
+    inverse = InverseDynamics(arm, elbows, payload)
 
     def poses(angles: Array) -> Array:
         """The idle joints' angles, then one pair of the last two joints per point, as poses (..., points, n)."""

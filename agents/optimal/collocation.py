@@ -9,83 +9,30 @@ function mapped over all points, the rest is constant.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agents.control.inverse_dynamics import InverseDynamics
-from elbow_gym.kinematics import hand_position, inverse_kinematics
-from elbow_gym.task.settings import Settings
+from agents.optimal.points import NAMES, Points
+from agents.optimal.problem import Problem
+from elbow_gym.kinematics import hand_position
 
 Array = NDArray[np.float64]
+Multipliers = tuple[Array, Array]
+"""Multipliers of the bounds of the variables and of the conditions."""
 
-SETTLING_TIME = 0.05
-"""Time constant with which an elbow's height left by the discretisation decays [s]."""
-NAMES = ("q", "q_dot", "q_ddot", "current", "elbow_force")
-
-
-@dataclass(frozen=True)
-class Problem:
-    """Problem of least negative return of one episode of an environment from its start without noise."""
-
-    settings: Settings
-    above_table: bool = False
-    """Whether joints 3..n and the hand must have z >= 0."""
-
-    @cached_property
-    def start(self) -> Array:
-        """Start pose [rad], (n,). The nominal pose must lie on the elbows' plane."""
-        arm, circle = self.settings.parsed_arm, self.settings.parsed_circle
-        pose = np.array(arm.nominal_pose)
-        if self.settings.start == "paper":
-            return pose
-        return inverse_kinematics(arm, pose, circle.position(circle.angle(0.0, float(circle.phase))))[0]
-
-    @cached_property
-    def target(self) -> Array:
-        """Targets at the ends of the control periods [m], (N, 3)."""
-        circle, settings = self.settings.parsed_circle, self.settings
-        time = settings.control_period * np.arange(1, settings.horizon + 1)
-        return circle.position(circle.angle(time, float(circle.phase)))
-
-
-class Points:
-    """CasADi functions of one collocation point: residuals, cost and their derivatives."""
-
-    def __init__(self, inverse: InverseDynamics, above_table: bool) -> None:
-        import casadi as ca
-
-        arm, n, p = inverse.arm, inverse.arm.n_joints, len(inverse.elbows)
-        q, q_dot, q_ddot, current = (ca.SX.sym(name, 1, n) for name in NAMES[:4])
-        force = ca.SX.sym(NAMES[4], 1, p)
-        z = ca.horzcat(q, q_dot, q_ddot, current, force).T
-        length, phi = arm.of_links("length"), ca.mtimes(q, ca.DM(inverse.to_pitch))
-        heights = ca.mtimes(ca.cos(phi), ca.DM(np.triu(np.ones((n, n))) * length[:, None]))
-        residual = inverse.torque(q, q_dot, q_ddot) - inverse.elbow_torque(q, force)
-        residual -= ca.mtimes(current, ca.DM(np.diag(inverse.torque_constant)))
-        free = [k for k in range(1, n) if above_table and k + 2 not in inverse.elbows]
-        held = inverse.elbow_speeds(q, q_dot) + inverse.elbow_heights(q) / SETTLING_TIME
-        conditions = ca.vertcat(residual.T, held.T, *[heights[k] for k in free])
-        self.equalities, self.conditions = n + p, n + p + len(free)
-
-        target, smoothing, weight = ca.SX.sym("target", 3), ca.SX.sym("smoothing"), ca.SX.sym("weight")
-        rho = ca.dot(ca.DM(length), ca.sin(phi).T)
-        error = ca.vertcat(rho * ca.cos(q[0]), rho * ca.sin(q[0]), heights[n - 1]) - target
-        cost = weight * ca.sqrt(ca.dot(error, error) + smoothing**2)
-        scale, multipliers = ca.SX.sym("scale"), ca.SX.sym("multipliers", self.conditions)
-        jacobian = ca.jacobian(conditions, z)
-        hessian = ca.triu(ca.hessian(scale * cost + ca.dot(multipliers, conditions), z)[0])
-        seen = [z, target, smoothing, weight]
-        self.size = z.numel()
-        self.residual = ca.Function("residual", [z], [conditions])
-        self.cost = ca.Function("cost", seen, [cost])
-        self.slope = ca.Function("slope", seen, [ca.gradient(cost, z)])
-        self.jacobian = ca.Function("jacobian", [z], [ca.vertcat(*jacobian.nonzeros())])
-        self.hessian = ca.Function("hessian", [*seen, scale, multipliers], [ca.vertcat(*hessian.nonzeros())])
-        self.jacobian_sparsity, self.hessian_sparsity = jacobian.sparsity(), hessian.sparsity()
+SOLVER = {
+    "print_level": 0,
+    "sb": "yes",
+    "linear_solver": "mumps",
+    # MUMPS's own permutation and scaling make it put off pivots, which fills the factors: an iteration takes 2 to 4
+    # times as long with them, and the steps are less exact.
+    "mumps_permuting_scaling": 0,
+    "mumps_scaling": 0,
+}
+"""Options of IPOPT for every solve."""
 
 
 class Transcription:
@@ -105,11 +52,12 @@ class Transcription:
         settings = problem.settings
         self.problem, self.degree = problem, degree
         self.periods, self.period = settings.horizon, settings.control_period
-        self.inverse = InverseDynamics(settings.parsed_arm, settings.elbow_joints)
+        self.inverse = InverseDynamics(settings.parsed_arm, settings.elbow_joints, settings.payload)
         self.n = settings.parsed_arm.n_joints
         self.points = Points(self.inverse, problem.above_table)
         self.fractions = np.array(ca.collocation_points(degree, "radau"))
         self._derivative = np.array(ca.collocation_coeff(self.fractions.tolist())[0])
+        self._weights = np.linalg.inv(self._derivative[1:].T)[-1]
         self._voltages = self.periods * degree * self.points.size
         self.size = self._voltages + self.periods * self.n
         self._start = {"q": problem.start, "q_dot": np.zeros(self.n), "current": np.zeros(self.n)}
@@ -218,8 +166,8 @@ class Transcription:
         self._bounds = {"lbx": -limit, "ubx": limit, "lbg": low, "ubg": np.concatenate([room.ravel(), right])}
 
     def solve(
-        self, guess: Array, smoothing: float, multipliers: Any = None, **options: Any
-    ) -> tuple[Array, Any, dict[str, Any]]:
+        self, guess: Array, smoothing: float, multipliers: Multipliers | None = None, **options: Any
+    ) -> tuple[Array, Multipliers, dict[str, Any]]:
         """IPOPT from a guess (and, for a warm start, multipliers).
 
         Args:
@@ -233,8 +181,7 @@ class Transcription:
         """
         import casadi as ca
 
-        settings = self.problem.settings
-        chosen = {"print_level": 0, "sb": "yes", "linear_solver": "mumps", **options}
+        chosen = {**SOLVER, **options}
         warm = {} if multipliers is None else {"lam_x0": multipliers[0], "lam_g0": multipliers[1]}
         if warm:
             # A larger barrier would first drive the solution away from where it has already come.
@@ -246,9 +193,57 @@ class Transcription:
             self._program,
             {"print_time": False, **self._derivatives, **{f"ipopt.{k}": v for k, v in chosen.items()}},
         )
-        parameters = [smoothing, settings.tracking_weight, settings.energy_weight]
-        found = solver(x0=guess, p=parameters, **self._bounds, **warm)
-        return np.array(found["x"]).ravel(), (found["lam_x"], found["lam_g"]), solver.stats()
+        found = solver(x0=guess, p=self._parameters(smoothing), **self._bounds, **warm)
+        x, lam_x, lam_g = (np.array(found[name]).ravel() for name in ("x", "lam_x", "lam_g"))
+        return x, (lam_x, lam_g), solver.stats()
+
+    def _parameters(self, smoothing: float) -> list[float]:
+        return [smoothing, self.problem.settings.tracking_weight, self.problem.settings.energy_weight]
+
+    def residuals(self, x: Array, smoothing: float, multipliers: Multipliers) -> tuple[float, float]:
+        """How far a point is from meeting the first-order conditions.
+
+        Args:
+            x: variables, (size,).
+            smoothing: as in `solve`.
+            multipliers: as `solve` returns them.
+
+        Returns:
+            The largest entry of the Lagrangian's gradient (in units of cost per unit of the variable) and of the
+            violation of conditions and bounds (N m, m/s, rad, rad/s, V).
+        """
+        p, bounds = self._parameters(smoothing), self._bounds
+        slope = np.array(self._derivatives["grad_f"](x, p)[1]).ravel()
+        conditions, jacobian = self._derivatives["jac_g"](x, p)
+        slope = slope + np.array(jacobian.T @ multipliers[1]).ravel() + multipliers[0]
+        values = np.concatenate([x, np.array(conditions).ravel()])
+        low = np.concatenate([bounds["lbx"], bounds["lbg"]])
+        high = np.concatenate([bounds["ubx"], bounds["ubg"]])
+        return float(np.abs(slope).max()), float(np.maximum(low - values, values - high).max(initial=0.0))
+
+    def taken_over(self, other: Transcription, x: Array, multipliers: Multipliers) -> tuple[Array, Multipliers]:
+        """Variables and multipliers of another mesh's solution of the same problem on this one's points.
+
+        Both are polynomials over the period. A condition's multiplier is its costate times the point's weight in the
+        quadrature, and only the costate is smooth.
+        """
+        parts, voltage = other.split(x)
+        with_start = np.concatenate([[0.0], other.fractions])
+        through, inner = _lagrange(with_start, self.fractions), _lagrange(other.fractions, self.fractions)
+        values = []
+        for name, value in parts.items():
+            if name in self._start:
+                before = np.concatenate([self._start[name][None], value[:-1, -1]])
+                values.append(through @ np.concatenate([before[:, None], value], axis=1))
+            else:
+                values.append(inner @ value)
+        points = np.concatenate(values, axis=-1).ravel()
+        own, rows = self.points.conditions, self.periods * other.degree * self.points.conditions
+        scale = self._weights[:, None] * inner / other._weights
+        theirs = multipliers[1][:rows].reshape(-1, other.degree, own), multipliers[1][rows:]
+        conditions = [(scale @ one.reshape(self.periods, other.degree, -1)).ravel() for one in theirs]
+        bounds = np.concatenate([np.zeros(self._voltages), multipliers[0][other._voltages :]])
+        return np.concatenate([points, voltage.ravel()]), (bounds, np.concatenate(conditions))
 
     def split(self, x: Array) -> tuple[dict[str, Array], Array]:
         """The quantities of `NAMES` at all points, each (periods, degree, ...), and the voltages [V], (periods, n)."""
@@ -272,6 +267,11 @@ class Transcription:
         """Electrical energy of a solution [J], signed."""
         form, linear = self._power_form
         return float(x @ (form @ x) / 2 + linear @ x) * self.period
+
+
+def _lagrange(nodes: Array, at: Array) -> Array:
+    """Matrix (len(at), len(nodes)) from a polynomial's values at nodes to those at other places."""
+    return np.linalg.solve(np.vander(nodes).T, np.vander(at, nodes.size).T).T
 
 
 class _Triplets:

@@ -13,7 +13,7 @@ from agents.cli import Commands, Count, JsonObject, Seed
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = {
-    "agents": ("reproduce", "train", "clone", "publish", "evaluate", "report", "watch"),
+    "agents": ("reproduce", "train", "clone", "publish", "evaluate", "bound", "report", "watch"),
     "benchmarks": ("energy", "learning", "optimal", "speed"),
 }
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from elbow_gym import LinkParameters, dynamics
+from elbow_gym import dynamics
 from tests.support.comparisons import assert_close, assume_solvable
 from tests.support.kernel_calls import accelerations_of
+from tests.support.payloads import with_speck
 from tests.support.strategies import between, cases
 
 
@@ -31,24 +32,11 @@ def test_fast_form_equals_the_papers_form_for_thousands_of_arms(case):
     assert_equal_to_the_papers_form(case)
 
 
-def extended(case, payload):
-    """The case's arm with one more link, of the payload's mass and no size, at the hand."""
-    speck = LinkParameters(mass=payload, length=1e-12, radius=1e-12)
-    arm = case.arm
-    return type(arm)(
-        links=(*arm.links, speck),
-        motors=(*arm.motors, arm.motors[-1]),
-        joint_viscous_friction=(*arm.joint_viscous_friction, 0.0),
-        nominal_pose=(*arm.nominal_pose, 0.0),
-        gravity=arm.gravity,
-    )
-
-
 @given(cases(largest=8), between(0.01, 5.0))
 def test_a_payload_is_a_last_link_of_no_size_that_never_turns(case, payload):
     _, q, q_dot, current, _, elbows = case
     n, p = case.arm.n_joints, len(elbows)
-    arm = extended(case, payload)
+    arm = with_speck(case.arm, payload)
     # Its joint stays locked: the first n equations are those of the arm that carries it.
     matrix = dynamics.mass_matrix(arm, [*q, 0.0])[:n, :n]
     bias = dynamics.bias_forces(arm, [*q, 0.0], [*q_dot, 0.0])[:n]

@@ -1,11 +1,13 @@
 """Optimal control on a short episode: derivatives, constraints, and the simulator reaching what was promised."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import OpenLoop, Trajectory
-from agents.optimal.bound import rollout
+from agents.optimal.guesses import rollout
 from elbow_gym.kinematics import elbow_heights, inverse_kinematics
 from elbow_gym.task.circle import Circle
 from elbow_gym.task.settings import Settings
@@ -15,8 +17,9 @@ from elbow_gym.task.settings import Settings
 def short():
     """0.1 s from the target with two elbows, and its solution."""
     pytest.importorskip("casadi")
-    from agents.optimal.bound import solve
-    from agents.optimal.collocation import Problem, Transcription
+    from agents.optimal.collocation import Transcription
+    from agents.optimal.problem import Problem
+    from agents.optimal.solution import solve
 
     settings = Settings(start="on_target", duration=0.1, start_noise=0.0)
     program = Transcription(Problem(settings), 2)
@@ -65,11 +68,11 @@ def test_simulator_reaches_the_predicted_cost_open_loop_and_under_the_lqr(short)
     program, solution = short
     for controller in (OpenLoop, TimeVaryingLQR):
         found, _ = rollout(program.problem.settings, lambda env, kind=controller: kind(env, solution.trajectory))
-        assert -found == pytest.approx(solution.cost, rel=0.02)
+        assert found == pytest.approx(solution.cost, rel=0.02)
 
 
 def test_a_warm_start_stays_where_the_last_solve_has_come(short):
-    from agents.optimal.bound import variables
+    from agents.optimal.solution import variables
 
     program, solution = short
     x, multipliers, _ = program.solve(variables(program, solution.trajectory), 0.003)
@@ -79,10 +82,53 @@ def test_a_warm_start_stays_where_the_last_solve_has_come(short):
 
 
 def test_an_impossible_problem_is_said_to_have_failed(short):
-    from agents.optimal.bound import SolveError, solve
+    from agents.optimal.solution import SolveError, solve
 
     program, solution = short
     with pytest.raises(SolveError, match=r"IPOPT must converge at a smoothing of 0\.03 m, got Maximum_Iterations"):
         solve(
             program, Trajectory(**{**vars(solution.trajectory), "voltage": solution.trajectory.voltage * 0}), max_iter=1
         )
+
+
+def test_a_finer_mesh_takes_over_the_costates(short):
+    from agents.optimal.collocation import Transcription
+    from agents.optimal.solution import Point, solve
+
+    program, solution = short
+    fine = Transcription(program.problem, 3)
+    x, multipliers = fine.taken_over(program, solution.point.x, solution.point.multipliers)
+    assert fine.cost(x) == pytest.approx(solution.cost, rel=1e-9)
+    again = Transcription(program.problem, 2).taken_over(fine, x, multipliers)
+    np.testing.assert_allclose(again[0], solution.point.x, rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(again[1][1], solution.point.multipliers[1], rtol=1e-7, atol=1e-9)
+    # Costates of another mesh are nearly those of this one: far fewer remain to be found than without them.
+    none = [np.zeros_like(part) for part in multipliers]
+    assert fine.residuals(x, 0.003, multipliers)[0] < 0.05 * fine.residuals(x, 0.003, none)[0]
+    refined = solve(fine, Point(x, multipliers), (0.003,))
+    assert fine.residuals(refined.point.x, 0.003, refined.point.multipliers)[0] < 1e-6
+    assert refined.cost == pytest.approx(solution.cost, rel=5e-3)
+
+
+def test_residuals_see_what_is_no_solution(short):
+    program, solution = short
+    x, multipliers = solution.point.x, solution.point.multipliers
+    assert max(program.residuals(x, solution.smoothing, multipliers)) < 1e-5
+    moved = x.copy()
+    moved[program.size - 1] += 30.0
+    assert program.residuals(moved, solution.smoothing, multipliers)[1] > 1.0
+    assert program.residuals(x, solution.smoothing, (multipliers[0] + 0.5, multipliers[1]))[0] > 0.1
+
+
+def test_payload_enters_the_program_and_the_simulator_agrees(short):
+    """A heavy load bends the solution; the simulator with the load reaches what the program promises."""
+    from agents.optimal.collocation import Transcription
+    from agents.optimal.problem import Problem
+    from agents.optimal.solution import Point, solve
+
+    program, solution = short
+    settings = replace(program.problem.settings, payload=0.3)
+    loaded = solve(Transcription(Problem(settings), 2), Point(solution.point.x), (0.03, 0.003))
+    assert abs(loaded.cost / solution.cost - 1.0) > 0.05
+    found, _ = rollout(settings, lambda env: OpenLoop(env, loaded.trajectory))
+    assert found == pytest.approx(loaded.cost, rel=0.02)

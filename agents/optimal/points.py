@@ -1,0 +1,53 @@
+"""One collocation point of the program: motion equations as residuals, the smoothed tracking cost, and derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agents.control.inverse_dynamics import InverseDynamics
+
+SETTLING_TIME = 0.05
+"""Time constant with which an elbow's height left by the discretisation decays [s]."""
+NAMES = ("q", "q_dot", "q_ddot", "current", "elbow_force")
+"""Quantities of a point, in their order."""
+
+
+class Points:
+    """CasADi functions of one collocation point: residuals, cost and their derivatives.
+
+    Args:
+        inverse: motion equations of the arm.
+        above_table: whether joints 3..n and the hand must have z >= 0.
+    """
+
+    def __init__(self, inverse: InverseDynamics, above_table: bool) -> None:
+        import casadi as ca
+
+        arm, n, p = inverse.arm, inverse.arm.n_joints, len(inverse.elbows)
+        q, q_dot, q_ddot, current = (ca.SX.sym(name, 1, n) for name in NAMES[:4])
+        force = ca.SX.sym(NAMES[4], 1, p)
+        z = ca.horzcat(q, q_dot, q_ddot, current, force).T
+        length, phi = arm.of_links("length"), ca.mtimes(q, ca.DM(inverse.to_pitch))
+        heights = ca.mtimes(ca.cos(phi), ca.DM(np.triu(np.ones((n, n))) * length[:, None]))
+        residual = inverse.torque(q, q_dot, q_ddot) - inverse.elbow_torque(q, force)
+        residual -= ca.mtimes(current, ca.DM(np.diag(inverse.torque_constant)))
+        free = [k for k in range(1, n) if above_table and k + 2 not in inverse.elbows]
+        held = inverse.elbow_speeds(q, q_dot) + inverse.elbow_heights(q) / SETTLING_TIME
+        conditions = ca.vertcat(residual.T, held.T, *[heights[k] for k in free])
+        self.equalities, self.conditions = n + p, n + p + len(free)
+
+        target, smoothing, weight = ca.SX.sym("target", 3), ca.SX.sym("smoothing"), ca.SX.sym("weight")
+        rho = ca.dot(ca.DM(length), ca.sin(phi).T)
+        error = ca.vertcat(rho * ca.cos(q[0]), rho * ca.sin(q[0]), heights[n - 1]) - target
+        cost = weight * ca.sqrt(ca.dot(error, error) + smoothing**2)
+        scale, multipliers = ca.SX.sym("scale"), ca.SX.sym("multipliers", self.conditions)
+        jacobian = ca.jacobian(conditions, z)
+        hessian = ca.triu(ca.hessian(scale * cost + ca.dot(multipliers, conditions), z)[0])
+        seen = [z, target, smoothing, weight]
+        self.size = z.numel()
+        self.residual = ca.Function("residual", [z], [conditions])
+        self.cost = ca.Function("cost", seen, [cost])
+        self.slope = ca.Function("slope", seen, [ca.gradient(cost, z)])
+        self.jacobian = ca.Function("jacobian", [z], [ca.vertcat(*jacobian.nonzeros())])
+        self.hessian = ca.Function("hessian", [*seen, scale, multipliers], [ca.vertcat(*hessian.nonzeros())])
+        self.jacobian_sparsity, self.hessian_sparsity = jacobian.sparsity(), hessian.sparsity()
