@@ -25,6 +25,9 @@ COARSE, FINE = 2, 3
 """Numbers of Radau points in a control period, in the search and in the refinement."""
 CONTINUED_BARRIER = 1e-4
 """Barrier that a solve from a task nearby starts with."""
+CONTINUED_ITERATIONS = 80
+"""Most iterations at one smoothing from a task nearby: near ones take five to fifteen, and where far ones take more, the
+postures are the shorter way."""
 
 
 def best_solution(
@@ -130,7 +133,7 @@ def continued(problem: Problem, start: Point | Trajectory, name: str, progress: 
     """Solves a problem from the solution of another one nearby; arguments, results and errors as in `certified`."""
     took, program = _stopwatch(), Transcription(problem, COARSE)
     options = {"mu_init": CONTINUED_BARRIER} if isinstance(start, Point) else {}
-    followed = solve(program, start, SMOOTHINGS, partial(_say, progress, name), **options)
+    followed = solve(program, start, SMOOTHINGS, partial(_say, progress, name), CONTINUED_ITERATIONS, **options)
     return _finished(problem, followed, name, progress, True, took), followed
 
 

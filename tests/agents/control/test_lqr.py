@@ -12,11 +12,11 @@ from elbow_gym.vector_env import ElbowArmVectorEnv
 from tests.support.trajectories import resting
 
 
-@pytest.mark.parametrize("elbows", [0, 2])
-def test_linearised_period_predicts_the_simulators_next_state(arm, elbows):
-    settings, trajectory = Settings(elbows=elbows, duration=0.1), resting(arm)
+@pytest.mark.parametrize(("elbows", "payload"), [(0, 0.0), (2, 0.0), (0, 1.0)])
+def test_linearised_period_predicts_the_simulators_next_state(arm, elbows, payload):
+    settings, trajectory = Settings(elbows=elbows, duration=0.1, payload=payload), resting(arm)
     A, B = linearised_periods(settings, trajectory)
-    simulator = Simulator(arm, elbows, 2)
+    simulator = Simulator(arm, elbows, 2, conditions=settings.conditions)
     rng = np.random.default_rng(0)
     current, voltage = 1e-3 * rng.normal(size=10), 1e-3 * rng.normal(size=10)
     poses = simulator.on_table(np.array([arm.nominal_pose, arm.nominal_pose + 1e-4 * rng.normal(size=10)]))
