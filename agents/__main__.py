@@ -126,7 +126,7 @@ def bound(
         weights: Cost per metre of tracking error and per watt of electrical power.
         environment: Other arguments of the environment, such as "arm", "duration" or "voltage_limit".
         under_table: Whether joints may go below z = 0; only with two or more elbows, where they hardly do, when None.
-        fresh: Whether tasks that were solved before are left aside.
+        fresh: Whether it is solved again, and from postures; the better solution is kept.
         output: File for the trajectory, .npz.
     """
     from agents.optimal.command import settings_of, solve_and_print

@@ -26,8 +26,8 @@ COARSE, FINE = 2, 3
 CONTINUED_BARRIER = 1e-4
 """Barrier that a solve from a task nearby starts with."""
 CONTINUED_ITERATIONS = 80
-"""Most iterations at one smoothing from a task nearby: near ones take five to fifteen, and where far ones take more, the
-postures are the shorter way."""
+"""Most iterations at one smoothing from a task nearby: near ones take five to fifteen; where far ones take more than
+this, the postures are the shorter way."""
 
 
 def best_solution(
@@ -178,7 +178,7 @@ def bound(
     Args:
         settings: arguments of the environment, without contact, friction, heat, supply resistance and randomisation.
         above_table: whether joints 3..n and the hand must have z >= 0; where there are fewer than two elbows if None.
-        fresh: whether what is in the store is left aside.
+        fresh: whether it is solved again, and from the postures; the cheaper solution stays in the store.
         parallel: whether the postures are followed in processes of their own; a script then needs its
             `if __name__ == "__main__":`.
         progress: called with a line on every solve.
@@ -190,9 +190,10 @@ def bound(
     """
     problem = Problem(settings, len(settings.elbow_joints) < 2 if above_table is None else above_table)
     store = Store() if store is None else store
-    stored = None if fresh else store.load(problem)
-    if stored is not None:
-        return Bound.from_figures(*stored)
+    stored = store.load(problem)
+    known = None if stored is None else Bound.from_figures(*stored)
+    if known is not None and not fresh:
+        return known
     # The LQR finds its gains with a batch, and one arm plays it.
     compile_before([(settings, 1), settings])
     near = None if fresh else store.nearest(problem)
@@ -206,5 +207,7 @@ def bound(
     if found is None:
         found = certified(problem, posture_guesses(problem), progress, parallel=parallel)
     answer, coarse = found
+    if known is not None and known.cost <= answer.cost:
+        return known
     store.save(problem, answer.figures, answer.optimum.trajectory, coarse.point)
     return answer
