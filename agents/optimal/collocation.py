@@ -27,8 +27,8 @@ SOLVER = {
     "print_level": 0,
     "sb": "yes",
     "linear_solver": "mumps",
-    # MUMPS's own permutation and scaling make it put off pivots, which fills the factors: an iteration takes 2 to 4
-    # times as long with them, and the steps are less exact.
+    # MUMPS's own permutation and scaling make it put off pivots, which fills the factors: with two points a period an
+    # iteration takes three times as long with them.
     "mumps_permuting_scaling": 0,
     "mumps_scaling": 0,
 }

@@ -14,7 +14,7 @@ from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import OpenLoop, Trajectory
 from agents.evaluation.metrics import REGIMES, UNITS
 from agents.learning.evaluation import evaluation
-from agents.optimal.bound import rollout
+from agents.optimal.guesses import rollout
 from agents.shipped import seeds as shipped
 from agents.shipped.seeds import load_policy, shipped_policies
 from agents.style import CONTROLLER_NAMES
@@ -114,8 +114,8 @@ def test_committed_voltages_repeat_their_cost_in_the_steps_that_they_were_found_
     figures, trajectory = cached(cell), Trajectory.load(files(cell)[1])
     settings = replace(cell.problem.settings, integrator="rk4", timestep=0.002)
     found, _ = rollout(settings, lambda env: OpenLoop(env, trajectory))
-    assert -found == pytest.approx(figures["closed_loop"], rel=1e-9)
-    assert -found == pytest.approx(figures["predicted_cost"], rel=0.02)
+    assert found == pytest.approx(figures["closed_loop"], rel=1e-9)
+    assert found == pytest.approx(figures["predicted_cost"], rel=0.02)
 
 
 @pytest.mark.parametrize("cell", SOLVED)
@@ -123,7 +123,7 @@ def test_committed_trajectory_costs_the_same_under_the_lqr_whatever_the_integrat
     # Open loop the arm falls away from it, and what two integrators differ by grows; held to it, it does not.
     trajectory = Trajectory.load(files(cell)[1])
     found, _ = rollout(cell.problem.settings, lambda env: TimeVaryingLQR(env, trajectory))
-    assert -found == pytest.approx(cached(cell)["closed_loop"], rel=1e-5)
+    assert found == pytest.approx(cached(cell)["closed_loop"], rel=1e-5)
 
 
 def test_every_shipped_policy_loads_fits_and_is_small():

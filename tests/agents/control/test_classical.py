@@ -12,7 +12,7 @@ from agents.control.minimum_jerk import minimum_jerk
 from agents.control.posture import best_postures, static_copper_loss
 from agents.evaluation.metrics import metrics
 from agents.evaluation.players import CLASSICAL
-from agents.optimal.bound import rollout
+from agents.optimal.guesses import rollout
 from elbow_gym import ElbowArmEnv, Simulator
 from elbow_gym.baselines.pd import CLIPPED
 from elbow_gym.kinematics import hand_position, inverse_kinematics, joint_positions

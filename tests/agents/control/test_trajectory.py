@@ -3,7 +3,7 @@
 import numpy as np
 
 from agents.control.trajectory import OpenLoop, Trajectory
-from agents.optimal.bound import rollout
+from agents.optimal.guesses import rollout
 from elbow_gym.task.settings import Settings
 from tests.support.trajectories import resting
 
