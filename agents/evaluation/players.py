@@ -239,9 +239,4 @@ def lqr_player(elbows: int) -> Player:
 
 def policy_player(name: str, policy: Policy, settings: Settings, **more: Any) -> Player:
     """A policy in environments that it was made for; its maker raises ValueError in others. See `player_of`."""
-
-    def make(env: ElbowArmVectorEnv) -> Controller:
-        policy.check(env)
-        return policy
-
-    return player_of(name, settings, make, identity=policy.card.digest, **more)
+    return player_of(name, settings, policy.acting_in, identity=policy.card.digest, **more)

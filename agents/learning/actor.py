@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from agents.files import copy_whole, write_text, write_whole
-from elbow_gym.baselines.policy import Policy, PolicyCard, Weights, pair
+from elbow_gym.baselines.policy import Policy, Weights, pair
+from elbow_gym.baselines.policy_card import PolicyCard
 from elbow_gym.task.settings import Settings
 
 

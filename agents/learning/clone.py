@@ -21,7 +21,8 @@ from agents.learning.clone_settings import CloneSettings
 from agents.learning.run import machine, versions
 from agents.learning.run_folder import RunFolder
 from agents.workers import Job, Tell, compile_before, in_processes
-from elbow_gym.baselines.policy import Policy, PolicyCard
+from elbow_gym.baselines.policy import Policy
+from elbow_gym.baselines.policy_card import PolicyCard
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 

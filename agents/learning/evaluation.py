@@ -38,7 +38,7 @@ def evaluation_seeds(settings: Settings) -> tuple[int, ...]:
 
 def evaluation(policy: Policy, settings: Settings) -> dict[str, float]:
     """Means over the evaluation seeds, by name; "steady" counts the last 60 % of the episode, 2-5 s by default."""
-    recording = record(settings, lambda _: policy, evaluation_seeds(settings))
+    recording = record(settings, policy.acting_in, evaluation_seeds(settings))
     whole, steady = metrics(recording), metrics(recording, 0.4 * recording.time[-1])
     return {
         "return": float(whole["return"].mean()),
