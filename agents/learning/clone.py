@@ -20,6 +20,7 @@ from agents.control.trajectory import Trajectory
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.run import machine, versions
 from agents.learning.run_folder import RunFolder
+from agents.learning.threads import one_thread
 from agents.workers import Job, Tell, compile_before, in_processes
 from elbow_gym.baselines.policy import Policy
 from elbow_gym.baselines.policy_card import PolicyCard
@@ -174,11 +175,8 @@ def _clone_one(
     settings: Settings, trajectory: Path, how: CloneSettings, seed: int, folder: Path, command: str, tell: Tell
 ) -> dict[str, Any]:
     """Clones with one seed, in a process of its own."""
-    import torch
-
     from agents.learning.evaluation import evaluation, evaluation_row, evaluation_seeds
 
-    torch.set_num_threads(1)
     files = RunFolder(folder)
     files.open(_record(settings, trajectory, how, seed), resume=True)
     rows: list[list[float]] = []
@@ -202,7 +200,8 @@ def _clone_one(
         tell(1)
         since = time.monotonic()
 
-    clone(settings, Trajectory.load(trajectory), how, seed, card, after_round)
+    with one_thread():
+        clone(settings, Trajectory.load(trajectory), how, seed, card, after_round)
     result = {
         "name": folder.name,
         "seed": seed,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import shlex
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
 from dataclasses import dataclass, field, fields, replace
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 import tyro
 from tyro.conf import OmitArgPrefixes, subcommand
 
-from agents.cli import Count, JsonObject, Seed
+from agents.cli import Count, JsonObject, Seed, spelled
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.presets import ALGORITHMS, default_settings
 from agents.learning.settings import AlgorithmSettings
@@ -114,18 +113,15 @@ def train_command(words: Sequence[str]) -> Callable[..., None]:
     def train(task: OmitArgPrefixes[Task], run: OmitArgPrefixes[Schedule], algorithm: AlgorithmSettings) -> None:
         """Trains agents, several seeds side by side; Ctrl-C keeps the best policies so far.
 
-        Each seed has a folder OUTPUT/ALGORITHM[_LABEL]_TASK_seedK with its best policy, evaluations.csv, a checkpoint
+        Each seed has a folder OUTPUT/ALGORITHM[_LABEL]_TASK_seedK with its best policy, evaluations.csv, checkpoints
         and TensorBoard logs. `train ppo --help` lists the options of PPO.
         """
-        from agents.learning.evaluation import sentence
         from agents.learning.train import train_all
 
-        runs = runs_of(task, run, algorithm, _spelled("train", words))
+        runs = runs_of(task, run, algorithm, spelled("python -m agents train", words))
         names = " to ".join(dict.fromkeys((runs[0].name, runs[-1].name)))
         print(f"{names}, into {run.output}: {algorithm}", flush=True)
-        for result in train_all(runs, run.workers, run.resume):
-            state = "finished" if result["finished"] else "not finished"
-            print(f"{result['name']}: {state} after {result['steps']:,d} steps, best: {sentence(result['best'])}")
+        train_all(runs, run.workers, run.resume)
 
     # The defaults follow from the task, and are known only now.
     train.__annotations__["algorithm"] = _algorithms(_named_task(words))
@@ -149,7 +145,7 @@ def clone_command(words: Sequence[str]) -> Callable[..., None]:
         settings = Settings(elbows=teacher.elbows)
         folders = [run.output / f"clone_elbows{teacher.elbows}_seed{seed}" for seed in run.all]
         source = OPTIMA / f"elbows{teacher.elbows}.npz" if teacher.trajectory is None else teacher.trajectory
-        command = _spelled("clone", words)
+        command = spelled("python -m agents clone", words)
         results = clone_all(settings, source, imitation, list(run.all), folders, command, run.resume)
         for result in results.values():
             print(f"{result['name']}: {result['training_seconds']:.0f} s, return {result['best']['return']:.2f}")
@@ -214,8 +210,3 @@ def _named_task(words: Sequence[str]) -> str:
 
 def _first_line(documented: Any) -> str:
     return documented.__doc__.split("\n")[0]
-
-
-def _spelled(command: str, words: Sequence[str]) -> str:
-    """The command line as a shell takes it, for the cards of policies."""
-    return shlex.join(["python", "-m", "agents", command, *words])
