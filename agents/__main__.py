@@ -52,17 +52,21 @@ def clone(words: Sequence[str]) -> Callable[..., None]:
 
 @app.command
 def publish(
-    runs: Annotated[tuple[Path, ...], Positional, arg(metavar="FOLDER [FOLDER ...]")], /, replace_seeds: bool = False
+    runs: Annotated[tuple[Path, ...], Positional, arg(metavar="FOLDER [FOLDER ...]")],
+    /,
+    replace_seeds: bool = False,
+    allow_worse: bool = False,
 ) -> None:
     """Takes finished runs over into the shipped policies and learning curves; a task's best seed is its baseline.
 
     Args:
         runs: Folders of the runs, as the training named them.
         replace_seeds: Whether to remove the shipped seeds of the same algorithm and task that are not among the runs.
+        allow_worse: Whether a shipped policy may give way to one with a worse return; otherwise that is refused.
     """
     from agents.learning.publish import publish as publish_runs
 
-    for name in publish_runs(runs, replace_seeds=replace_seeds):
+    for name in publish_runs(runs, replace_seeds=replace_seeds, allow_worse=allow_worse):
         print(name)
 
 
@@ -90,7 +94,8 @@ def evaluate(
 
     player = find_player(policy, elbows, env)
     seeds = [BENCHMARK_SEEDS[0] + k for k in range(episodes)]
-    with tqdm(total=100, unit="%", desc=policy, file=sys.stderr) as bar:
+    # Percent alone: tqdm's rate would be in percent per second.
+    with tqdm(total=100, desc=policy, bar_format="{l_bar}{bar}| {elapsed} < {remaining}", file=sys.stderr) as bar:
 
         def advance(done: int, total: int) -> None:
             bar.update(100 * done // total - bar.n)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import json
 import os
 import secrets
@@ -153,11 +154,10 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
         OSError: the file cannot be opened.
         ValueError: the file is cut or altered, with its name.
     """
+    content = io.BytesIO(path.read_bytes())
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        with np.load(content, allow_pickle=False) as arrays:
             return {name: arrays[name] for name in arrays.files}
-    # A damaged zip raises nearly anything, a flipped bit in a size MemoryError.
+    # A damaged zip raises nearly anything: a flipped bit in a size MemoryError, in a place OSError.
     except Exception as error:
-        if isinstance(error, OSError) and error.errno is not None:
-            raise
         raise ValueError(f"{path} must be an .npz file as it was written, got a damaged one: {error}") from error

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
-import os
 import sys
 import time
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from importlib.util import find_spec
@@ -16,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from agents.control.trajectory import Trajectory
-from agents.files import write_csv, write_text
+from agents.files import check_writable, write_csv, write_text
 from agents.optimal.bound import Optimum, SolveError, optimum, posture_guesses
 from agents.optimal.collocation import Problem
 from agents.shipped import OPTIMA
-from agents.workers import compile_before
+from agents.workers import Pool, compile_before
 from benchmarks.machine import machine, versions
 from elbow_gym.task.settings import Settings
 
@@ -153,14 +151,10 @@ def run_cells(todo: Sequence[Cell], optima: Path, workers: int) -> dict[str, str
     from tqdm import tqdm
 
     failures: dict[str, str] = {}
-    context = multiprocessing.get_context("spawn")
-    # Small dense algebra: threads of two workers' BLAS would only get in each other's way.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
     if todo:
         # A solution is played by one arm; the LQR around it finds its gains with a batch.
         compile_before([(Settings(), 1), Settings()])
-    with tqdm(total=len(todo), file=sys.stderr, unit="cell") as bar, ProcessPoolExecutor(workers, context) as pool:
+    with tqdm(total=len(todo), file=sys.stderr, unit="cell") as bar, Pool(workers) as pool:
         # The front and what may go under the table start from the bound of their elbow count, so they wait for that.
         waiting = [cell for cell in todo if cell.parent in todo]
         running = {pool.submit(solve_cell, cell, optima): cell for cell in todo if cell not in waiting}
@@ -191,6 +185,8 @@ def optimal(output: Path, optima: Path, fresh: bool, workers: int, front: bool) 
     """
     if find_spec("casadi") is None:
         raise ValueError('casadi must be installed to solve, got none: pip install -e ".[optimal]"')
+    for place in (output, optima):
+        check_writable(place)
     started = time.monotonic()
     todo = [cell for cell in cells(front) if fresh or cached(cell, optima) is None]
     failures = run_cells(todo, optima, workers)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import Trajectory
+from agents.files import check_writable
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.run import machine, versions
 from agents.learning.run_folder import RunFolder
@@ -154,9 +155,18 @@ def clone_all(
         else:
             jobs[seed] = Job(partial(_clone_one, settings, trajectory, how, seed, folder, command), how.rounds)
     if jobs:
+        for seed, folder in zip(seeds, folders, strict=True):
+            if seed in jobs:
+                check_writable(folder)
         compile_before([settings])
-        with tqdm(total=len(jobs) * how.rounds, unit="round", desc="clone") as bar:
-            results.update(in_processes(jobs, bar.update))
+        try:
+            with tqdm(total=len(jobs) * how.rounds, unit="round", desc="clone") as bar:
+                results.update(in_processes(jobs, bar.update))
+        except KeyboardInterrupt:
+            for folder in folders:
+                finished = RunFolder(folder).result() is not None
+                print(f"{folder.name}: {'finished' if finished else 'stopped; --resume starts it anew'}", flush=True)
+            raise
     return {seed: results[seed] for seed in seeds}
 
 

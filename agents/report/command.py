@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from agents.evaluation.players import entries
-from agents.files import write_text
+from agents.files import check_writable, write_text
 from agents.report.page import page
 from agents.report.runs import collect
 
@@ -20,6 +20,7 @@ def report(output: Path, results: Path = RESULTS) -> Path:
         output: the HTML file.
         results: folder of the benchmark's results: its tables and its front.
     """
+    check_writable(output.parent)
     runs = collect(entries())
     write_text(output, page(runs, results))
     print(f"{output}: {len(runs)} runs, {output.stat().st_size / 1e6:.1f} MB")

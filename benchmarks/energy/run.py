@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from agents.cli import spelled
 from agents.evaluation.metrics import REGIMES, UNITS
 from agents.evaluation.players import Player
 from agents.evaluation.regimes import BENCHMARK_SEEDS, SHIFTED, in_all_regimes
-from agents.files import write_text, write_whole
+from agents.files import check_writable, write_text, write_whole
 from agents.workers import Job, Tell, compile_before, counted, in_processes
 from benchmarks import learning
 from benchmarks.energy import breakdown, cache, pareto, terminal
@@ -196,7 +197,7 @@ def save(rows: Sequence[Row], plan: Plan, seconds: float, folder: Path) -> None:
             energy_table.write_rows(chosen, folder / f"{stem}.csv")
             write_text(folder / f"{stem}.md", energy_table.markdown(chosen))
     context = {
-        "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
+        "command": spelled("python -m benchmarks", sys.argv[1:]),
         "made": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "seconds": round(seconds, 1),
         "seeds": list(plan.seeds),
@@ -246,6 +247,8 @@ def energy(
     started = time.monotonic()
     chosen = plan(full or publish, episodes, folder=folder, fresh=fresh)
     output = RESULTS if publish else output
+    for place in (output, folder):
+        check_writable(place)
     rows = measure(chosen, parallel)
     save(rows, chosen, time.monotonic() - started, output)
     changed = publish_blocks(output) if publish else []

@@ -1,15 +1,18 @@
 """Commands of a program: the first word chooses one, errors end with a line, and each has its own help."""
 
+import errno
 import os
 import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Literal
 
 import pytest
 
-from agents.cli import Commands, Count, JsonObject, Seed
+from agents.cli import Commands, Count, JsonObject, Seed, spelled
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = {
@@ -118,6 +121,75 @@ def test_wrong_words_end_with_one_line_and_status_two(app, capsys, words, messag
 def test_refusal_by_the_command_ends_with_one_line(app):
     with pytest.raises(SystemExit, match=r"^error: word must be good, got bad$"):
         app.run(["echo", "--word", "bad"])
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device", "runs/a"), "No space left on device: runs/a"),
+        (PermissionError(errno.EACCES, "Permission denied", "runs"), "Permission denied: runs"),
+        (ChildProcessError("a worker process was killed"), "a worker process was killed"),
+    ],
+)
+def test_error_of_the_system_ends_with_one_sentence(app, error, line):
+    @app.command
+    def fail() -> None:
+        """Fails as files do."""
+        raise error
+
+    with pytest.raises(SystemExit, match=f"^error: {line}$"):
+        app.run(["fail"])
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_signal_ends_with_the_shells_code_and_without_a_traceback(app, capsys, number, code):
+    cleaned = []
+
+    @app.command
+    def hang() -> None:
+        """Waits for a signal."""
+        try:
+            os.kill(os.getpid(), number)
+            time.sleep(60.0)
+        finally:
+            cleaned.append(number)
+
+    before = signal.getsignal(number)
+    with pytest.raises(SystemExit) as end:
+        app.run(["hang"])
+    assert (end.value.code, cleaned) == (code, [number])
+    assert capsys.readouterr().err == ""
+    assert signal.getsignal(number) is before
+
+
+def test_signal_that_a_parent_has_set_to_be_ignored_stays_ignored(app):
+    @app.command
+    def go_on() -> None:
+        """Is not ended by the terminal's end, as under nohup."""
+        os.kill(os.getpid(), signal.SIGHUP)
+
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        app.run(["go_on"])
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.parametrize(
+    ("word", "shown"),
+    [
+        ("/home/ada/thesis/first", "first"),
+        ("--output=/home/ada/runs", "--output=runs"),
+        ("~/runs", "runs"),
+        ("../ada/runs", "runs"),
+        (r"C:\Users\ada\runs", "runs"),
+        ("runs/first", "runs/first"),
+        ("0.002", "0.002"),
+    ],
+)
+def test_command_lines_for_cards_hold_no_folders_of_a_user(word, shown):
+    assert spelled("python -m agents train", ["ppo", word]) == f"python -m agents train ppo {shown}"
 
 
 def test_line_is_plain_on_a_coloured_terminal():
