@@ -174,7 +174,7 @@ def _ending_signals() -> Iterator[list[int]]:
 
     def end(number: int, _: Any) -> None:
         came.append(number)
-        _forget_lost_terminal()
+        forget_lost_terminal()
         raise KeyboardInterrupt
 
     names = ("SIGTERM", "SIGHUP") if threading.current_thread() is threading.main_thread() else ()
@@ -189,7 +189,7 @@ def _ending_signals() -> Iterator[list[int]]:
             signal.signal(number, signal.SIG_DFL)
 
 
-def _forget_lost_terminal() -> None:
+def forget_lost_terminal() -> None:
     """Drops what is still said to a terminal that is gone, where every word would raise an error."""
     for handle in (1, 2):
         try:

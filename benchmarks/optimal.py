@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.control.trajectory import Trajectory
-from agents.files import check_writable, write_csv, write_text
+from agents.files import check_writable, read_json, write_csv, write_text
 from agents.optimal.bound import Optimum, SolveError, optimum, posture_guesses
 from agents.optimal.collocation import Problem
 from agents.shipped import OPTIMA
@@ -91,7 +91,7 @@ def cached(cell: Cell, optima: Path = OPTIMA) -> dict[str, Any] | None:
     card, trajectory = files(cell, optima)
     if not (card.is_file() and trajectory.is_file()):
         return None
-    plain = json.loads(card.read_text(encoding="utf-8"))
+    plain = read_json(card)
     return plain["figures"] if plain["problem"] == cell.question else None
 
 

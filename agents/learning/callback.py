@@ -12,6 +12,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
+from agents.cli import forget_lost_terminal
 from agents.learning.actor import policy_of
 from agents.learning.checkpoint import save_checkpoint
 from agents.learning.evaluation import evaluation, evaluation_row, evaluation_seeds, sentence
@@ -81,7 +82,11 @@ class Keeper(BaseCallback):
         """Moves the progress bar to a number of control periods. KeyboardInterrupt where the run is `unwanted`."""
         if unwanted():
             raise KeyboardInterrupt
-        self._bar.update(steps - self._bar.n)
+        try:
+            self._bar.update(steps - self._bar.n)
+        except OSError:
+            # Whoever closes a terminal may want the run to be saved, if not to go on.
+            forget_lost_terminal()
 
     def _on_step(self) -> bool:
         if unwanted():

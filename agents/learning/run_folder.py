@@ -207,16 +207,25 @@ class RunFolder:
         if not target.exists() or Checkpoint(target).damage() is not None:
             shutil.rmtree(target, ignore_errors=True)
             write_checkpoint(target, model, buffer, state, progress, best)
-        # Later ones are damaged, or of a past that did not come again; unfinished folders are those of killed runs.
+        # Later ones are damaged, or of a past that did not come again.
         found = self._checkpoints()
         kept = [path for path in found if path <= target][-KEPT:]
-        for old in [*self.path.glob(f".{CHECKPOINT}*"), *(path for path in found if path not in kept)]:
+        for old in (path for path in found if path not in kept):
             shutil.rmtree(old, ignore_errors=True)
+        self._sweep()
 
     def _check_there(self) -> None:
         """FileNotFoundError where the folder that the run began in has gone."""
         if not (self.path / RECORD).is_file():
             raise FileNotFoundError(errno.ENOENT, f"the run's folder is gone, or its {RECORD}", str(self.path))
+
+    def _sweep(self) -> None:
+        """Removes what a killed run has left under temporary names."""
+        for rest in self.path.glob(".*"):
+            if rest.is_dir():
+                shutil.rmtree(rest, ignore_errors=True)
+            else:
+                rest.unlink(missing_ok=True)
 
     def _checkpoints(self) -> list[Path]:
         """Folders of the checkpoints, the latest last."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import wait
 from typing import Any
 
-from agents.cli import sentence
+from agents.cli import forget_lost_terminal, sentence
 from agents.files import check_space, check_writable
 from agents.learning.checkpoint import buffer_size, check_versions, load_checkpoint
 from agents.learning.checkpoint_folder import Checkpoint
@@ -79,6 +79,7 @@ def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
             remaining = total - model.num_timesteps
             model.learn(remaining, callback=keeper, log_interval=run.settings.log_interval, reset_num_timesteps=False)
         except KeyboardInterrupt:
+            forget_lost_terminal()
             print(f"{run.name}: interrupted; keeping the best policy so far", file=sys.stderr)
         if begun:
             keeper.finish(model)

@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Literal
@@ -160,6 +161,28 @@ def test_signal_ends_with_the_shells_code_and_without_a_traceback(app, capsys, n
     assert (end.value.code, cleaned) == (code, [number])
     assert capsys.readouterr().err == ""
     assert signal.getsignal(number) is before
+
+
+def test_what_is_said_to_a_terminal_that_is_gone_is_dropped():
+    code = (
+        "import os, signal; from agents.cli import forget_lost_terminal;"
+        "signal.signal(signal.SIGHUP, signal.SIG_IGN);"
+        "open('ready', 'w').close(); input();"
+        "forget_lost_terminal(); print('lost', flush=True); open('done', 'w').close()"
+    )
+    pty = pytest.importorskip("pty")
+    with tempfile.TemporaryDirectory() as folder:
+        terminal, side = pty.openpty()
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        pipes = {"stdin": subprocess.PIPE, "stdout": side, "stderr": side, "cwd": folder, "env": environment}
+        process = subprocess.Popen([sys.executable, "-c", code], **pipes)
+        os.close(side)
+        while not (Path(folder) / "ready").exists():
+            time.sleep(0.01)
+        os.close(terminal)
+        process.communicate(b"go\n")
+        assert process.returncode == 0
+        assert (Path(folder) / "done").exists()
 
 
 def test_signal_that_a_parent_has_set_to_be_ignored_stays_ignored(app):

@@ -17,10 +17,10 @@ from elbow_gym.task.settings import Settings
 from tests.support.trainings import SAC_KILLED, SAC_SMALL, SMALL, small_run
 
 LONG = {
-    "ppo": {"settings": replace(SMALL, total_timesteps=30_720, evaluate_every=2048)},
+    "ppo": {"settings": replace(SMALL, total_timesteps=61_440, evaluate_every=4096)},
     "sac": {
         **SAC_KILLED,
-        "settings": replace(SAC_SMALL, total_timesteps=3200, learning_starts=400, evaluate_every=400),
+        "settings": replace(SAC_SMALL, total_timesteps=4800, learning_starts=400, evaluate_every=400),
     },
 }
 """Trainings of several seconds, by kind."""

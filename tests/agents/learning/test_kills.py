@@ -39,7 +39,7 @@ def test_training_that_was_killed_at_random_moments_ends_bit_for_bit_as_the_one_
 
 
 FULL = """
-import resource, sys
+import os, resource, shutil, sys
 from pathlib import Path
 from agents.learning.callback import Keeper
 from tests.support.kills import long_run
@@ -63,7 +63,7 @@ TROUBLES = {
         "__import__('shutil').rmtree(sys.argv[1], ignore_errors=True)",
         "the run's folder is gone, or its run.json: ",
     ),
-    "forbidden": ("__import__('os').geteuid() or __import__('os').seteuid(65534)", "Permission denied: "),
+    "forbidden": ("os.geteuid() or os.seteuid(65534)", "Permission denied: "),
 }
 
 

@@ -176,11 +176,13 @@ def test_checkpoint_that_fails_leaves_the_former_and_no_rest(opened, monkeypatch
 def test_rest_of_a_killed_checkpoint_is_not_read_and_goes_with_the_next(opened):
     write_checkpoint(opened, 512)
     (opened.path / ".checkpoint_000000001024-killed").mkdir()
+    (opened.path / ".best-killed.json").write_text("half")
     assert opened.checkpoint().progress() == {"steps": 512}
     write_checkpoint(opened, 1024)
-    assert sorted(path.name for path in opened.path.iterdir() if path.is_dir()) == [
+    assert sorted(path.name for path in opened.path.iterdir()) == [
         "checkpoint_000000000512",
         "checkpoint_000000001024",
+        "run.json",
     ]
 
 

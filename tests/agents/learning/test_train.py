@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 import torch
 from stable_baselines3 import PPO
+from tqdm import tqdm
 
 from agents.learning.callback import Keeper
 from agents.learning.checkpoint import running
@@ -228,6 +229,18 @@ def test_run_that_nobody_waits_for_any_more_stops(monkeypatch, tmp_path):
     result = train(run)
     assert (result["finished"], result["steps"]) == (False, 4)
     assert run.files.best() is not None
+
+
+def test_run_goes_on_where_its_terminal_is_gone(tmp_path, monkeypatch):
+    class Bar(tqdm):
+        def update(self, n=1):
+            raise OSError(errno.EIO, "Input/output error")
+
+    forgotten = []
+    monkeypatch.setattr("agents.learning.callback.tqdm", Bar)
+    monkeypatch.setattr("agents.learning.callback.forget_lost_terminal", lambda: forgotten.append(True))
+    assert train(small_run(tmp_path / "run"))["finished"]
+    assert forgotten
 
 
 def interrupted_after(steps, monkeypatch):
