@@ -203,7 +203,8 @@ def forget_lost_terminal() -> None:
 def sentence(error: BaseException) -> str:
     """An error's message; of the operating system's errors the reason and the file."""
     if isinstance(error, OSError) and error.strerror is not None:
-        return error.strerror if error.filename is None else f"{error.strerror}: {error.filename}"
+        name = os.fsdecode(error.filename) if isinstance(error.filename, bytes) else error.filename
+        return error.strerror if name is None else f"{error.strerror}: {name}"
     return str(error)
 
 

@@ -96,8 +96,9 @@ def check_writable(folder: Path) -> None:
 
 
 def check_space(folder: Path, size: int) -> None:
-    """Raises OSError with the folder's name unless its disk has room for a number of bytes."""
-    free = shutil.disk_usage(folder).free
+    """Raises OSError with a folder's name unless the disk that it is on, or will be, has room for a number of bytes."""
+    there = next(place for place in (folder.resolve(), *folder.resolve().parents) if place.exists())
+    free = shutil.disk_usage(there).free
     if free < size:
         reason = f"{os.strerror(errno.ENOSPC)}: {size / 1e6:.0f} MB are needed, {free / 1e6:.0f} MB are free"
         raise OSError(errno.ENOSPC, reason, str(folder))

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
 from concurrent.futures import wait
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from agents.cli import forget_lost_terminal, sentence
@@ -57,7 +60,7 @@ def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
     if result is not None:
         return result
     settings = Settings(**run.environment)
-    with one_thread():
+    with one_thread(), _errors_once(files.path):
         env = MeteredVectorEnv(run.settings.num_envs, **run.settings.training_arguments(settings.arguments))
         monitored = VecMonitor(SB3VecEnv(env))
         if found is not None:
@@ -103,6 +106,24 @@ def _result(run: Run, found: Checkpoint | None) -> dict[str, Any] | None:
     progress, result = None if found is None else found.progress(), run.files.result()
     over = progress is not None and (progress["steps"] >= run.settings.total_timesteps or _out_of_time(run, progress))
     return result if over and result is not None and result.get("finished") else None
+
+
+@contextmanager
+def _errors_once(folder: Path) -> Iterator[None]:
+    """Gives the system's errors the folder's name where they have none, and has TensorBoard's thread not print its own.
+
+    The thread keeps its error, and raises it again here with the next entry.
+    """
+    before = threading.excepthook
+    threading.excepthook = lambda failed: None if isinstance(failed.exc_value, OSError) else before(failed)
+    try:
+        yield
+    except OSError as error:
+        if error.errno is not None and error.filename is None:
+            error.filename = str(folder)
+        raise
+    finally:
+        threading.excepthook = before
 
 
 def _out_of_time(run: Run, progress: dict[str, Any]) -> bool:

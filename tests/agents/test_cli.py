@@ -129,6 +129,7 @@ def test_refusal_by_the_command_ends_with_one_line(app):
     [
         (OSError(errno.ENOSPC, "No space left on device", "runs/a"), "No space left on device: runs/a"),
         (PermissionError(errno.EACCES, "Permission denied", "runs"), "Permission denied: runs"),
+        (FileNotFoundError(errno.ENOENT, "No such file or directory", b"runs"), "No such file or directory: runs"),
         (ChildProcessError("a worker process was killed"), "a worker process was killed"),
     ],
 )

@@ -84,7 +84,7 @@ def test_folder_that_cannot_be_written_and_disk_without_room_are_named(tmp_path)
     (tmp_path / "file").write_text("")
     with pytest.raises(NotADirectoryError, match="file/inside"):
         check_writable(tmp_path / "file" / "inside")
-    check_space(tmp_path, 0)
+    check_space(tmp_path / "new" / "not" / "yet", 0)
     with pytest.raises(OSError, match=rf"No space left on device: 1000000000000 MB are needed, .* free: '{tmp_path}'"):
         check_space(tmp_path, 10**18)
 

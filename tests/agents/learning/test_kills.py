@@ -59,10 +59,7 @@ app.run(["go"])
 """
 TROUBLES = {
     "full": ("resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))", "File too large: "),
-    "gone": (
-        "__import__('shutil').rmtree(sys.argv[1], ignore_errors=True)",
-        "the run's folder is gone, or its run.json: ",
-    ),
+    "gone": ("shutil.rmtree(sys.argv[1], ignore_errors=True)", "No such file or directory: "),
     "forbidden": ("os.geteuid() or os.seteuid(65534)", "Permission denied: "),
 }
 

@@ -140,6 +140,16 @@ def test_damaged_checkpoint_is_named_and_the_one_before_taken(opened, policy, ca
     assert str(bad) in said or (name == "checksums.json" and str(bad.parent) in said)
 
 
+def test_checkpoint_whose_checksums_lack_a_file_is_damaged(opened):
+    write_checkpoint(opened, 512)
+    sums = json.loads((opened.checkpoint().path / "checksums.json").read_text())
+    for name in ("model.zip", "progress.json", "state.pkl"):
+        fewer = {entry: value for entry, value in sums.items() if entry != name}
+        (opened.path / "checkpoint_000000000512" / "checksums.json").write_text(json.dumps(fewer))
+        with pytest.raises(ValueError, match=f"got damaged or missing .*{name}"):
+            opened.checkpoint()
+
+
 def test_run_whose_checkpoints_are_all_damaged_is_refused_and_not_started_anew(opened):
     for steps in (512, 1024):
         write_checkpoint(opened, steps)
