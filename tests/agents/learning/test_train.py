@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -301,6 +302,24 @@ def test_seed_that_fails_leaves_the_others_going_on(tmp_path, monkeypatch, capsy
     first, second = capsys.readouterr().out.splitlines()[-2:]
     assert first == f"seed0: failed: No space left on device: {tmp_path / 'seed0'}"
     assert second.startswith("seed1: finished after 1,024 steps, best: ")
+
+
+def test_error_without_a_name_gets_the_folders_and_a_threads_is_not_printed(tmp_path, monkeypatch, capsys):
+    def fail():
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def step(keeper):
+        thread = threading.Thread(target=fail)
+        thread.start()
+        thread.join()
+        fail()
+
+    monkeypatch.setattr(Keeper, "_on_step", step)
+    hook = threading.excepthook
+    with pytest.raises(OSError, match=f"No space left on device: '{tmp_path / 'run'}'"):
+        train(small_run(tmp_path / "run"))
+    assert "Traceback" not in capsys.readouterr().err
+    assert threading.excepthook is hook
 
 
 def test_torch_has_its_threads_back_after_a_training(tmp_path):
