@@ -142,6 +142,17 @@ def parse(function: Function, prog: str, words: Sequence[str]) -> Callable[[], A
     _refuse(f"{one_line(said.getvalue())}; see {prog} --help")
 
 
+def spelled(package: str, command: str, words: Sequence[str]) -> str:
+    """The command line as a shell takes it, for files that a command writes; of a user's folders the last name alone.
+
+    Args:
+        package: what `python -m` runs.
+        command: name of the command.
+        words: the command line after it.
+    """
+    return shlex.join(["python", "-m", package, command, *map(_without_folders, words)])
+
+
 def one_line(box: str) -> str:
     """The reason in tyro's framed message, with the options or words that could be meant; the rest is left out."""
     # Colours, and drawn or blank frames, follow the terminal.
@@ -208,11 +219,6 @@ def sentence(error: BaseException) -> str:
     return str(error)
 
 
-def spelled(program: str, words: Sequence[str]) -> str:
-    """A command line as a shell takes it, for files that are passed on: of foreign folders the last name alone."""
-    return shlex.join([*program.split(), *map(_without_folders, words)])
-
-
 def _without_folders(word: str) -> str:
     option, equals, value = word.partition("=") if word.startswith("--") else ("", "", word)
     for kind in (PurePosixPath, PureWindowsPath):
@@ -262,13 +268,17 @@ def _integer(rule: str, least: int) -> PrimitiveConstructorSpec[int]:
     )
 
 
+JSON_RULE = "a JSON object such as '{\"duration\": 10}'"
+
+
 def _json_object(words: list[str]) -> dict[str, Any]:
     try:
         plain = json.loads(words[0])
     except json.JSONDecodeError as error:
-        raise ValueError(f"must be a JSON object, got {words[0]} ({error})") from error
+        after = f", which is no JSON from character {error.pos + 1} on"
+        raise ValueError(f"must be {JSON_RULE}, got {words[0]}{after}") from error
     if not isinstance(plain, dict):
-        raise ValueError(f"must be a JSON object, got {words[0]}")
+        raise ValueError(f"must be {JSON_RULE}, got {words[0]}")
     return plain
 
 

@@ -9,10 +9,11 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
+from functools import partial
 from multiprocessing import connection
 from typing import Any, Generic, TextIO, TypeVar
 
@@ -64,7 +65,9 @@ class _WithoutNotice:
         self._stream.flush()
 
 
-def compile_before(batches: Iterable[Settings | tuple[Settings, int]]) -> None:
+def compile_before(
+    batches: Iterable[Settings | tuple[Settings, int]], others: Sequence[Callable[[], Any]] = ()
+) -> None:
     """Compiles the kernels that environments will need, here and one after the other, before processes start.
 
     Otherwise each process would compile the same kernel at the same time. Nothing is compiled or said when Numba's
@@ -73,6 +76,7 @@ def compile_before(batches: Iterable[Settings | tuple[Settings, int]]) -> None:
     Args:
         batches: settings of the environments, each alone or with the number of arms side by side; alone they mean
             a batch. Up to two arms have another kernel than more.
+        others: calls that compile further kernels, one each.
     """
     import numpy as np
 
@@ -85,7 +89,8 @@ def compile_before(batches: Iterable[Settings | tuple[Settings, int]]) -> None:
         if alike not in wanted:
             wanted.append(alike)
     kernels = {(settings.table is False, arms <= 2) for settings, arms in wanted}
-    notice = f"Compiling the kernel for this machine, once: about {COMPILE_SECONDS * len(kernels)} s of CPU time."
+    seconds = COMPILE_SECONDS * (len(kernels) + len(others))
+    notice = f"Compiling the kernel for this machine, once: about {seconds} s of CPU time."
     said = threading.Event()
 
     def say() -> None:
@@ -93,16 +98,19 @@ def compile_before(batches: Iterable[Settings | tuple[Settings, int]]) -> None:
             said.set()
             print(notice, file=stream, flush=True)
 
+    def step_once(settings: Settings, arms: int) -> None:
+        env = ElbowArmVectorEnv(arms, **settings.arguments)
+        env.reset(seed=0)
+        env.step(np.zeros((arms, settings.parsed_arm.n_joints), dtype=np.float32))
+
     stream = sys.stderr
     with contextlib.redirect_stderr(_WithoutNotice(stream)):
-        for settings, arms in wanted:
+        for work in (*(partial(step_once, *batch) for batch in wanted), *others):
             timer = threading.Timer(PATIENCE, say)
             timer.daemon = True
             timer.start()
             try:
-                env = ElbowArmVectorEnv(arms, **settings.arguments)
-                env.reset(seed=0)
-                env.step(np.zeros((arms, settings.parsed_arm.n_joints), dtype=np.float32))
+                work()
             finally:
                 timer.cancel()
 

@@ -2,34 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from agents.cli import Commands, Count
+from agents.cli import Commands, Count, spelled
 from agents.shipped import CURVES, OPTIMA
-from benchmarks.machine import LATEST, RESULTS
+from benchmarks.machine import LATEST, LATEST_SPEED, RESULTS
 
 app = Commands("python -m benchmarks", "Benchmarks of energy, learning, the optimum and the simulator's speed.")
 
 
-@app.command
-def energy(
-    output: Path = LATEST, episodes: Count | None = None, fresh: bool = False, full: bool = False, publish: bool = False
-) -> None:
-    """Energy and error of every controller with two, one and no elbow on the table, in the regimes A, B and C.
+@app.command_from
+def energy(words: Sequence[str]) -> Callable[..., None]:
+    """Energy and error of every controller with two, one and no elbow on the table, in the regimes A, B and C."""
 
-    By default three start poses and one policy of each learned controller, in about a minute of CPU time. An
-    interrupted run goes on where it stopped: what was measured with the same code and files is not measured again.
+    def energy(
+        output: Path = LATEST,
+        episodes: Count | None = None,
+        fresh: bool = False,
+        full: bool = False,
+        publish: bool = False,
+    ) -> None:
+        """Energy and error of every controller with two, one and no elbow on the table, in the regimes A, B and C.
 
-    Args:
-        output: Folder for the tables and figures.
-        episodes: Number of start poses, each from a fixed seed; 3, or 20 of a full run, when None.
-        fresh: Whether to measure everything again.
-        full: Whether to play all parts, start poses and training seeds.
-        publish: Whether to play everything and write the results to benchmarks/results and the READMEs' tables.
-    """
-    from benchmarks.energy.run import energy as measure_energy
+        By default three start poses and one policy of each learned controller, in about a minute of CPU time. An
+        interrupted run goes on where it stopped: what was measured with the same code and files is not measured again.
 
-    measure_energy(output, episodes, fresh, full, publish)
+        Args:
+            output: Folder for the tables and figures.
+            episodes: Number of start poses, each from a fixed seed; 3, or 20 of a full run, when None.
+            fresh: Whether to measure everything again.
+            full: Whether to play all parts, start poses and training seeds.
+            publish: Whether to play everything and write the results to benchmarks/results and the READMEs' tables.
+        """
+        from benchmarks.energy.run import energy as measure_energy
+
+        measure_energy(output, episodes, fresh, full, publish, command=spelled("benchmarks", "energy", words))
+
+    return energy
 
 
 @app.command
@@ -64,17 +74,23 @@ def optimal(
     solve_optimal(output, optima, fresh, workers, front)
 
 
-@app.command
-def speed(output: Path = RESULTS, quick: bool = False) -> None:
-    """This project against MuJoCo, Pinocchio, NumPy and Gymnasium: table, CSV, JSON and a figure.
+@app.command_from
+def speed(words: Sequence[str]) -> Callable[..., None]:
+    """This project against MuJoCo, Pinocchio, NumPy and Gymnasium: tables, CSV, JSON and figures."""
 
-    Args:
-        output: Folder for the results.
-        quick: Whether to take few and short samples, which show that everything runs.
-    """
-    from benchmarks.speed.run import speed as measure_speed
+    def speed(output: Path = LATEST_SPEED, quick: bool = False, publish: bool = False) -> None:
+        """This project against MuJoCo, Pinocchio, NumPy and Gymnasium: tables, CSV, JSON and figures.
 
-    measure_speed(output, quick)
+        Args:
+            output: Folder for the results.
+            quick: Whether to take few and short samples, which show that everything runs.
+            publish: Whether to write the results to benchmarks/results and the READMEs' tables.
+        """
+        from benchmarks.speed.run import speed as measure_speed
+
+        measure_speed(output, quick, publish, command=spelled("benchmarks", "speed", words))
+
+    return speed
 
 
 if __name__ == "__main__":

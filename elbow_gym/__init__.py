@@ -11,8 +11,10 @@ if TYPE_CHECKING:
     from elbow_gym.baselines.pd import PDController
     from elbow_gym.baselines.policy import load_policy
     from elbow_gym.env import ElbowArmEnv
-    from elbow_gym.multi_objective import MOElbowArmEnv
+    from elbow_gym.interface import Interface
+    from elbow_gym.multi_objective import MOElbowArmEnv, MOElbowArmVectorEnv
     from elbow_gym.parameters import ArmParameters, LinkParameters, MotorParameters, paper_arm
+    from elbow_gym.simulation.options import Conditions
     from elbow_gym.simulator import Simulator
     from elbow_gym.table import TableParameters
     from elbow_gym.task.circle import Circle
@@ -24,10 +26,13 @@ __version__ = "0.1.0"
 _HOMES = {
     "ArmParameters": "parameters",
     "Circle": "task.circle",
+    "Conditions": "simulation.options",
     "ElbowArmEnv": "env",
     "ElbowArmVectorEnv": "vector_env",
+    "Interface": "interface",
     "LinkParameters": "parameters",
     "MOElbowArmEnv": "multi_objective",
+    "MOElbowArmVectorEnv": "multi_objective",
     "MotorParameters": "parameters",
     "PDController": "baselines.pd",
     "Simulator": "simulator",
@@ -39,10 +44,13 @@ _HOMES = {
 __all__ = [
     "ArmParameters",
     "Circle",
+    "Conditions",
     "ElbowArmEnv",
     "ElbowArmVectorEnv",
+    "Interface",
     "LinkParameters",
     "MOElbowArmEnv",
+    "MOElbowArmVectorEnv",
     "MotorParameters",
     "PDController",
     "Simulator",
@@ -52,10 +60,13 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+# A type checker that sees it would take every misspelt name for Any.
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        if name in _HOMES:
+            return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 # The table alone carries the arm, so that the policy decides where to brace.
@@ -90,4 +101,9 @@ for _name, _arguments in (("ElbowArm", {}), ("ElbowArmTable", TABLE), ("ElbowArm
         kwargs=_arguments,
     )
 # Gymnasium's own checker knows scalar rewards only.
-register(id="mo-ElbowArm-v0", entry_point="elbow_gym.multi_objective:MOElbowArmEnv", disable_env_checker=True)
+register(
+    id="mo-ElbowArm-v0",
+    entry_point="elbow_gym.multi_objective:MOElbowArmEnv",
+    vector_entry_point="elbow_gym.multi_objective:MOElbowArmVectorEnv",
+    disable_env_checker=True,
+)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import numbers
 from collections.abc import Mapping
 from typing import Any, cast
 
@@ -11,10 +12,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from elbow_gym.checks import as_numbers, non_negative, require_entries
-from elbow_gym.parameters import ArmParameters, Array
+from elbow_gym.checks import as_numbers, require_entries
+from elbow_gym.parameters import ArmParameters
+from elbow_gym.rendering.screen import can_draw
 from elbow_gym.rendering.viewer import RENDER_MODES, Viewer
+from elbow_gym.task.attributes import TaskAttributes, check_arguments
 from elbow_gym.task.episodes import Episodes
+from elbow_gym.task.infos import of_arm
 from elbow_gym.task.settings import Settings
 
 
@@ -30,7 +34,9 @@ def observation_space(episodes: Episodes) -> spaces.Space[NDArray[np.float32]]:
     return cast("spaces.Space[NDArray[np.float32]]", spaces.Box(-high, high, dtype=np.float32))
 
 
-class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
+class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
+    TaskAttributes, gym.Env[NDArray[np.float32], NDArray[np.float32]]
+):
     """A ten-joint arm with DC motors leans its elbows on a table and draws a circle; every joule is counted.
 
     ## Description
@@ -65,7 +71,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | lookahead_error | 3 | m | 0.5 | 10 | hand minus the target 0.1 s later, along x, y, z |
     | target_angle | 2 | - | 1 | 1 | cosine and sine of the target's angle on the circle |
     | contact_force | n-1, with a table | N | 5 | 10000 | the table's normal force, joints 3 to n and the hand |
-    | temperature_rise | n, with heat | K | 50 | 10000 | of the windings above the ambient |
+    | temperature_rise | n, with heat | K | 50 | 10000 | temperature of the windings above the ambient |
     | pending_voltage | n per period of the longest delay | V | 24 | 10000 | voltages still on their way, newest first |
 
     ## Rewards
@@ -116,19 +122,24 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     picture.
 
     `info` holds tracking_error [m], electrical_power [W], electrical_energy, drawn_energy and link_work [J] since the
-    reset, reward_tracking, reward_energy, voltage [V], elbow_force [N], constraint_residual [m/s^2], the
-    vertical acceleration that an elbow has in spite of its force, and below_table [s].
+    reset, reward_tracking, reward_energy, voltage [V] at the motors' terminals at the period's end, voltage_command
+    [V], which a sagging supply falls short of, elbow_force [N], constraint_residual [m/s^2], the vertical acceleration
+    that an elbow has in spite of its force, and below_table [s].
 
     A table adds contact_force [N] (joints 3 to n and the hand; radial, tangential, normal), load_bearing and
     contact_loss [J]; heat adds temperature_rise [K] and overheated; a supply's resistance adds supply_loss [J].
-    After a reset `parameters` and `circle` have what was drawn.
+    Where they are drawn, `parameters` and `circle` have the arm's and the circle's. All keys are there after a reset
+    and after a step.
+
+    `energy_weight` and `tracking_weight` can be set on `env.unwrapped`, from the next step on; the other arguments can
+    be read there. `env.spec.max_episode_steps` is the number of control periods in an episode.
 
     ## Version History
 
     * v0: first version.
     """
 
-    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES) if can_draw() else [], "render_fps": 50}
 
     def __init__(
         self,
@@ -140,6 +151,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         render_height: int = 480,
         **settings: Any,
     ) -> None:
+        check_arguments(settings, ElbowArmEnv.__init__)
         self.render_mode = render_mode
         self._episodes = Episodes(Settings(elbows=elbows, arm=arm, **settings))
         self.metadata = {**self.metadata, "render_fps": round(self.settings.control_frequency)}
@@ -148,39 +160,13 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._viewer = Viewer(self._episodes, render_mode, render_width, render_height)
         self._ready = False
 
-    @property
-    def settings(self) -> Settings:
-        """Arguments that the environment was made with."""
-        return self._episodes.settings
-
-    @property
-    def episodes(self) -> Episodes:
-        """Batch with the one arm of this environment."""
-        return self._episodes
-
-    @property
-    def observation_names(self) -> tuple[str, ...]:
-        """Name and unit of each entry of the observation."""
-        return self._episodes.layout.names
-
-    def decode(self, observation: NDArray[np.float32]) -> dict[str, Array]:
-        """Quantities of the observation in SI units, by feature name, each (size,)."""
-        return self._episodes.layout.decode(observation)
-
-    def set_energy_weight(self, energy_weight: float) -> None:
-        """Changes the cost per watt of electrical power [1/W] from the next step on."""
-        self._episodes.energy_weight = non_negative("energy_weight", energy_weight)
-
-    def set_tracking_weight(self, tracking_weight: float) -> None:
-        """Changes the cost per metre of tracking error [1/m] from the next step on."""
-        self._episodes.tracking_weight = non_negative("tracking_weight", tracking_weight)
-
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Starts an episode. Raises ValueError naming a wrong option, with everything as it was before."""
         before = self._np_random, self._np_random_seed
-        super().reset(seed=seed)
+        # NumPy's integers are no ints, which Gymnasium asks for.
+        super().reset(seed=int(seed) if isinstance(seed, numbers.Integral) else seed)
         try:
             self._episodes.reset([self.np_random], options=options)
         except ValueError:
@@ -189,7 +175,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._ready = True
         self._viewer.restart()
         snapshot = self._episodes.observe()
-        return snapshot.observation[0], single(self._episodes.info(snapshot))
+        return snapshot.observation[0], of_arm(self._episodes.info(snapshot))
 
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One control period. Raises ValueError, with the state untouched, on a wrong shape or NaN."""
@@ -203,7 +189,7 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             outcome.reward.item(),
             outcome.terminated.item(),
             outcome.truncated.item(),
-            of_one(outcome.info),
+            of_arm(outcome.info),
         )
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -230,17 +216,3 @@ class ElbowArmEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.np_random.bit_generator.state = state["generator"]
         self._ready = True
         self._viewer.restart()
-
-
-def of_one(info: Mapping[str, Any]) -> dict[str, Any]:
-    """A step's info of the only arm: numbers, truths and arrays."""
-    one = {key: rows[0] for key, rows in info.items()}
-    if "overheated" in one:
-        one["overheated"] = bool(one["overheated"])
-    return one
-
-
-def single(info: Mapping[str, Any]) -> dict[str, Any]:
-    """A reset's info of the only arm: that of a step and, in dicts of their own, what was drawn."""
-    drawn = {key: of_one(cast("dict[str, Any]", rows)) for key, rows in info.items() if isinstance(rows, dict)}
-    return {**of_one({key: rows for key, rows in info.items() if key not in drawn}), **drawn}

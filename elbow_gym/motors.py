@@ -63,41 +63,42 @@ def temperature_rate(arm: ArmParameters, current: ArrayLike, temperature_rise: A
 
 
 def bus_current(
-    command: ArrayLike, current: ArrayLike, supply_voltage: float, *, regeneration: bool = True
-) -> np.float64:
-    """I that the motors' drives draw from the common supply [A]: sum of u i over the joints, duty u = command / V0.
+    command: ArrayLike, current: ArrayLike, supply_voltage: ArrayLike, *, regeneration: bool = True
+) -> Array | np.float64:
+    """I that the motors' drives draw from the common supply [A], (...): sum of u i over the joints, u = command / V0.
 
     Negative when they feed back; without regeneration the supply then takes none, and a brake chopper burns it.
 
     Args:
-        command: terminal voltages that a stiff supply would give [V], shape (n,).
-        current: armature currents i [A], shape (n,).
-        supply_voltage: V0 [V].
+        command: terminal voltages that a stiff supply would give [V], shape (..., n).
+        current: armature currents i [A], shape (..., n).
+        supply_voltage: V0 [V], shape (...).
         regeneration: whether the supply takes current back.
     """
-    duty = np.asarray(command, dtype=np.float64) / supply_voltage
-    drawn = (duty * np.asarray(current, dtype=np.float64)).sum()
+    duty = np.asarray(command, dtype=np.float64) / np.asarray(supply_voltage)[..., None]
+    drawn = (duty * np.asarray(current, dtype=np.float64)).sum(axis=-1)
     return drawn if regeneration else np.maximum(drawn, 0.0)
 
 
 def terminal_voltage(
     command: ArrayLike,
     current: ArrayLike,
-    supply_voltage: float,
+    supply_voltage: ArrayLike,
     supply_resistance: float,
     regeneration: bool = True,
 ) -> Array:
-    """Voltages at the motor terminals under a supply with an internal resistance [V], shape (n,).
+    """Voltages at the motor terminals under a supply with an internal resistance [V], shape (..., n).
 
     v = command (1 - R_s I / V0), I of `bus_current`: the drives keep their duty while the bus sags to V0 - R_s I. The
     supply itself loses R_s I^2 [W], so that V0 I = sum v i + R_s I^2 with regeneration.
 
     Args:
-        command: terminal voltages that a stiff supply would give [V], shape (n,).
-        current: armature currents i [A], shape (n,).
-        supply_voltage: V0 of the unloaded supply [V].
+        command: terminal voltages that a stiff supply would give [V], shape (..., n).
+        current: armature currents i [A], shape (..., n).
+        supply_voltage: V0 of the unloaded supply [V], shape (...).
         supply_resistance: R_s [ohm].
         regeneration: whether the supply takes current back.
     """
     drawn = bus_current(command, current, supply_voltage, regeneration=regeneration)
-    return np.asarray(command, dtype=np.float64) * (1.0 - supply_resistance * drawn / supply_voltage)
+    sag = supply_resistance * drawn / np.asarray(supply_voltage)
+    return np.asarray(command, dtype=np.float64) * (1.0 - np.asarray(sag)[..., None])

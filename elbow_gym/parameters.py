@@ -1,4 +1,4 @@
-"""Parameters of motors, links and arms, validated when they are made."""
+"""Parameters of links and arms, validated when they are made; those of motors are in `motor_parameters`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from elbow_gym.checks import check_entries, finite, non_negative, positive, require_entries
+from elbow_gym.motor_parameters import MotorParameters
 
 Array = NDArray[np.float64]
 
@@ -21,60 +22,6 @@ MAXIMUM_JOINTS = 64
 
 def _set(instance: object, name: str, value: object) -> None:
     object.__setattr__(instance, name, value)
-
-
-@dataclass(frozen=True, kw_only=True)
-class MotorParameters:
-    """A DC servo motor behind a gear (eqs 1-12). All positive; frictions and temperature_coefficient also zero."""
-
-    armature_resistance: float = 1.1
-    """Armature resistance R [ohm]."""
-    armature_inductance: float = 0.0017
-    """Armature inductance L [H]."""
-    torque_constant: float = 0.203
-    """Torque constant K [N m/A], equal to the back-EMF constant [V s/rad]."""
-    rotor_inertia: float = 0.000164
-    """Inertia I_m of the rotor, at the motor shaft [kg m^2]."""
-    gear_ratio: float = 3.0
-    """Gear ratio k, turns of the motor per turn of the joint [-]."""
-    gear_viscous_friction: float = 0.01
-    """Viscous friction d_m of the gear, at the motor shaft [N m s/rad]."""
-    gear_coulomb_friction: float = 0.0
-    """Coulomb friction T_c of the gear, at the motor shaft [N m]."""
-    thermal_resistance: float = 5.0
-    """Thermal resistance R_th from the winding to the ambient [K/W]."""
-    heat_capacity: float = 20.0
-    """Heat capacity C_th of the winding [J/K]."""
-    temperature_coefficient: float = 0.00393
-    """Temperature coefficient alpha of the armature resistance [1/K]; copper's by default."""
-    temperature_limit: float = 100.0
-    """Temperature above the ambient that the winding is rated for [K]."""
-
-    def __post_init__(self) -> None:
-        may_be_zero = {"gear_viscous_friction", "gear_coulomb_friction", "temperature_coefficient"}
-        for field in fields(self):
-            check = non_negative if field.name in may_be_zero else positive
-            _set(self, field.name, check(field.name, getattr(self, field.name)))
-
-    @property
-    def joint_torque_constant(self) -> float:
-        """Torque constant K_m = K k at the joint [N m/A].   Eqs 9-12."""
-        return self.torque_constant * self.gear_ratio
-
-    @property
-    def reflected_inertia(self) -> float:
-        """Inertia of the rotor J_m = I_m k^2 at the joint [kg m^2].   Eq. 12."""
-        return self.rotor_inertia * self.gear_ratio**2
-
-    @property
-    def reflected_viscous_friction(self) -> float:
-        """Viscous friction of the gear D_m = d_m k^2 at the joint [N m s/rad].   Eq. 12."""
-        return self.gear_viscous_friction * self.gear_ratio**2
-
-    @property
-    def reflected_coulomb_friction(self) -> float:
-        """Coulomb friction of the gear T_c k at the joint [N m]."""
-        return self.gear_coulomb_friction * self.gear_ratio
 
 
 def cylinder_axial_inertia(mass: Any, radius: Any) -> Any:

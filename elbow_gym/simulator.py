@@ -1,4 +1,4 @@
-"""A batch of arms in time: the only place where public (B, n) arrays meet the compiled kernel."""
+"""Batch of arms in time, the only place where public (B, n) arrays meet the compiled kernel."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from elbow_gym.kernel.rows import (
 from elbow_gym.kernel.slots import BLOCK_LANES
 from elbow_gym.kinematics import elbow_heights, pitches
 from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
-from elbow_gym.simulation.options import Conditions
+from elbow_gym.simulation.options import Conditions, as_conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.simulation.state_views import Readings
 from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep, rates
@@ -40,10 +40,10 @@ class Simulator(Readings):
         arm: an ArmParameters or a preset name.
         elbows: 0, 1, 2 as in the paper, or joint numbers held at z = 0.
         num_envs: B, the number of arms.
+        conditions: payload, compliant table, friction, heat and supply; `Conditions()`, the paper's, when None.
         timestep: length of the steps that `step` takes [s]; refused where it is too long for the arm's fastest rate.
         integrator: "exponential": Runge-Kutta of order 4 with exact decay of the currents; "rk4": the classical method.
         num_threads: threads over which blocks of arms are spread; the results do not depend on it.
-        conditions: fields of `Conditions`: payload, table, elbow_friction, heat, supply_resistance...
 
     Raises ValueError naming the argument.
     """
@@ -54,10 +54,10 @@ class Simulator(Readings):
         elbows: int | tuple[int, ...] = 2,
         num_envs: int = 1,
         *,
+        conditions: Conditions | None = None,
         timestep: float = 0.002,
         integrator: str = "exponential",
         num_threads: int = 1,
-        **conditions: Any,
     ) -> None:
         self.arm = as_arm(arm)
         self.elbows = as_elbows(elbows, self.arm.n_joints)
@@ -65,11 +65,12 @@ class Simulator(Readings):
             raise ValueError(f"elbows must be at most {MAXIMUM_ELBOWS}, got {len(self.elbows)}")
         self.num_envs = positive_integer("num_envs", num_envs)
         self._num_threads = positive_integer("num_threads", num_threads)
-        self.conditions = Conditions(**conditions)
+        self.conditions = as_conditions(conditions)
         self.timestep = positive("timestep", timestep)
         if integrator not in INTEGRATORS:
             raise ValueError(f"integrator must be one of {INTEGRATORS}, got {integrator!r}")
-        found = rates(parameter_table(self.arm, self.conditions), self.conditions, elbows=bool(self.elbows))
+        row = parameter_table(self.arm, self.conditions)
+        found = rates(row, self.conditions, elbows=bool(self.elbows))
         check_timestep(self.timestep, self.timestep, found, integrator)
         self._switches = {
             "table": self.conditions.surface is not None,
@@ -83,7 +84,7 @@ class Simulator(Readings):
         rows = SWITCHED_STATE_ROWS if switched else STATE_ROWS
         self._state = np.zeros((self.num_envs, rows, n))
         self._summary = np.zeros((self.num_envs, SUMMARY_COLUMNS + len(self.elbows)))
-        self._parameters = np.repeat(parameter_table(self.arm, self.conditions)[None], self.num_envs, axis=0)
+        self._parameters = np.repeat(row[None], self.num_envs, axis=0)
         # Timesteps of `step` and control periods since the reset.
         self._clock = np.zeros((self.num_envs, 2), dtype=np.int64)
         self.period = 0.0
@@ -125,7 +126,7 @@ class Simulator(Readings):
             q_dot: rates [rad/s] that keep the elbows on the table to 1e-6 m/s; zero when None.
             current: armature currents [A]; zero when None.
             mask: which arms, shape (B,); all when None.
-            temperature_rise: of the windings above the ambient [K]; zero when None.
+            temperature_rise: temperature of the windings above the ambient [K]; zero when None.
         """
         *given, chosen = self.check_state(q, q_dot, current, mask, temperature_rise)
         # They may be views of the running state, which is zeroed next.
@@ -140,7 +141,7 @@ class Simulator(Readings):
         self._summary[chosen] = 0.0
         self._clock[chosen] = 0
         self._share("refresh", self._state, self._parameters, self._elbow_index, self._summary)
-        # Looking at the other arms' last state again does not make it the outcome of their last step.
+        # A new summary of the other arms' last state does not make it the outcome of their last step.
         self._summary[~chosen, VALID] = valid[~chosen]
 
     def parameters(self, chosen: NDArray[np.int64]) -> Array:
@@ -148,7 +149,7 @@ class Simulator(Readings):
         return self._parameters[chosen]
 
     def set_parameters(self, chosen: NDArray[np.int64], rows: Array) -> None:
-        """Gives some arms other parameter rows, as `tables.parameter_rows` makes them, from now on."""
+        """Gives some arms other parameter rows, as `parameter_rows` makes them, from now on."""
         self._parameters[chosen] = rows
 
     def on_table(self, q: ArrayLike) -> Array:
@@ -232,7 +233,7 @@ class Simulator(Readings):
         Returns:
             The number of arms that are not `valid`; a negative one, with nothing changed, where an action is NaN.
         """
-        # One share looks at its own actions before it moves; several must not move before all are seen.
+        # One share checks its own actions before it moves; several must not move before all are checked.
         if self._num_threads > 1 and np.isnan(actions[0]).any():
             return -1
         own = (self._state, self._parameters, self._elbow_index, steps, self._summary)
@@ -261,11 +262,11 @@ class Simulator(Readings):
         return total
 
     def get_state(self) -> dict[str, NDArray[Any]]:
-        """A copy of everything that runs on; `set_state` continues from it bit for bit."""
+        """A copy of the state, summary and clock; `set_state` continues from it bit for bit."""
         return {"state": self._state.copy(), "summary": self._summary.copy(), "clock": self._clock.copy()}
 
     def set_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Takes a state of `get_state` from a simulator of the same size."""
+        """Restores a state of `get_state` of a simulator of the same size. Raises ValueError on another size."""
         restore({"state": self._state, "summary": self._summary, "clock": self._clock}, state)
 
     @property

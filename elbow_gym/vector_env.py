@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numbers
+import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
@@ -12,17 +14,20 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from elbow_gym.checks import as_numbers, non_negative, require_entries
+from elbow_gym.checks import as_numbers, positive_integer, require_entries
 from elbow_gym.env import ElbowArmEnv, action_space, observation_space
-from elbow_gym.parameters import ArmParameters, Array
+from elbow_gym.parameters import ArmParameters
 from elbow_gym.rendering.viewer import Viewer
-from elbow_gym.task.episodes import Episodes
+from elbow_gym.task.arm_access import ask, assign
+from elbow_gym.task.attributes import TaskAttributes, check_arguments
+from elbow_gym.task.episodes import Episodes, Outcome
+from elbow_gym.task.infos import Flags, masked, only, restarted
 from elbow_gym.task.settings import Settings
 
-Flags = NDArray[np.bool_]
 
-
-class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+class ElbowArmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
+    TaskAttributes, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]
+):
     """`ElbowArmEnv` for `num_envs` arms at once; arm i equals a single environment seeded `seed + i`, bit for bit.
 
     Takes the arguments of `ElbowArmEnv` and
@@ -31,6 +36,8 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         num_envs: number B of arms.
         autoreset_mode: "NextStep", "SameStep" or "Disabled" (then reset with `options={"reset_mask": ...}`).
         num_threads: threads over which blocks of arms are spread; the results do not depend on it.
+        max_episode_steps: control periods after which an episode is truncated at the latest, as `gymnasium.make` has
+            it; None or -1: `duration` alone counts.
 
     In the render mode "human" a window shows the first four arms.
     """
@@ -45,16 +52,20 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         arm: str | ArmParameters | Mapping[str, Any] = "paper",
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         num_threads: int = 1,
+        max_episode_steps: int | None = None,
         render_mode: str | None = None,
         render_width: int = 640,
         render_height: int = 480,
         **settings: Any,
     ) -> None:
+        check_arguments(settings, ElbowArmVectorEnv.__init__)
         modes = [mode.value for mode in AutoresetMode]
         if autoreset_mode not in [*AutoresetMode, *modes]:
             raise ValueError(f"autoreset_mode must be one of {modes}, got {autoreset_mode!r}")
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self._episodes = Episodes(Settings(elbows=elbows, arm=arm, **settings), num_envs, num_threads)
+        unlimited = max_episode_steps is None or max_episode_steps == -1
+        longest = None if unlimited else positive_integer("max_episode_steps", max_episode_steps)
+        self._episodes = Episodes(Settings(elbows=elbows, arm=arm, **settings), num_envs, num_threads, longest)
         self.num_envs = num_envs
         self.render_mode = render_mode
         self._viewer = Viewer(self._episodes, render_mode, render_width, render_height)
@@ -73,21 +84,6 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         self._started = np.zeros(num_envs, dtype=np.bool_)
 
     @property
-    def settings(self) -> Settings:
-        """Arguments that the environment was made with."""
-        return self._episodes.settings
-
-    @property
-    def episodes(self) -> Episodes:
-        """Batch of the arms of this environment."""
-        return self._episodes
-
-    @property
-    def observation_names(self) -> tuple[str, ...]:
-        """Name and unit of each entry of an arm's observation."""
-        return self._episodes.layout.names
-
-    @property
     def np_random(  # pyright: ignore[reportIncompatibleMethodOverride]
         self,
     ) -> tuple[np.random.Generator, ...]:
@@ -101,27 +97,24 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         self._seed(None, np.ones(self.num_envs, dtype=np.bool_))
         return tuple(self._seeds)
 
-    def decode(self, observation: NDArray[np.float32]) -> dict[str, Array]:
-        """Quantities of the observations in SI units, by feature name, each (B, size)."""
-        return self._episodes.layout.decode(observation)
-
-    def set_energy_weight(self, energy_weight: float) -> None:
-        """Changes the cost per watt of electrical power [1/W] from the next step on."""
-        self._episodes.energy_weight = non_negative("energy_weight", energy_weight)
-
-    def set_tracking_weight(self, tracking_weight: float) -> None:
-        """Changes the cost per metre of tracking error [1/m] from the next step on."""
-        self._episodes.tracking_weight = non_negative("tracking_weight", tracking_weight)
-
     def _seed(self, seed: int | Sequence[int | None] | None, chosen: Flags) -> None:
         if not self._generators:
             drawn = [seeding.np_random() for _ in range(self.num_envs)]
             self._generators, self._seeds = [pair[0] for pair in drawn], [pair[1] for pair in drawn]
         if seed is None:
             return
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else list(seed)
+        rule = f"seed must be an integer or one per arm ({self.num_envs})"
+        try:
+            # NumPy's integers are no ints.
+            if isinstance(seed, numbers.Integral):
+                first = int(seed)
+                seeds = [first + i for i in range(self.num_envs)]
+            else:
+                seeds = [None if one is None else operator.index(one) for one in cast("Sequence[int | None]", seed)]
+        except TypeError as error:
+            raise ValueError(f"{rule}, got {seed!r}") from error
         if len(seeds) != self.num_envs:
-            raise ValueError(f"seed must be an integer or one per arm ({self.num_envs}), got {len(seeds)}")
+            raise ValueError(f"{rule}, got {len(seeds)}")
         for i in np.flatnonzero(chosen):
             if seeds[i] is not None:
                 self._generators[i], self._seeds[i] = seeding.np_random(seeds[i])
@@ -175,7 +168,7 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             raise gym.error.ResetNeeded(
                 f"reset must be called with options['reset_mask'] for arms that are over, got {np.flatnonzero(waiting)}"
             )
-        outcome = self._episodes.step(array, waiting if some_wait else None)
+        outcome = self._play(array, waiting if some_wait else None)
         self._viewer.follow()
         over = outcome.terminated | outcome.truncated
         if not some_wait and not over.any():
@@ -183,21 +176,22 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
             return (*outcome[:4], masked(outcome.info, everyone))
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             return self._same_step(outcome, over)
-        drawn: dict[str, Any] = {}
+        info = outcome.info
         if some_wait:
             # Arms that ended a step ago start anew instead; what they did meanwhile does not count.
             self._episodes.reset(self._generators, waiting)
             self._viewer.restart(waiting)
             snapshot = self._episodes.observe(~waiting)
-            info = self._episodes.info(snapshot)
             outcome.observation[waiting] = snapshot.observation[waiting]
             for array in (outcome.reward, outcome.terminated, outcome.truncated):
                 array[waiting] = 0
-            for key, rows in outcome.info.items():
-                rows[waiting] = info[key][waiting]
-            drawn = masked(drawn_only(info, outcome.info), waiting)
+            info = restarted(info, self._episodes.info(snapshot), waiting)
         self._over = outcome.terminated | outcome.truncated
-        return (*outcome[:4], {**masked(outcome.info, np.ones(self.num_envs, dtype=np.bool_)), **drawn})
+        return (*outcome[:4], masked(info, np.ones(self.num_envs, dtype=np.bool_)))
+
+    def _play(self, actions: NDArray[np.float64], waiting: Flags | None) -> Outcome:
+        """A control period of every arm, before those that are over start anew."""
+        return self._episodes.step(actions, waiting)
 
     def _same_step(self, outcome: Any, over: Flags) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         final_obs = np.full(self.num_envs, None, dtype=object)
@@ -206,17 +200,11 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         self._episodes.reset(self._generators, over)
         self._viewer.restart(over)
         snapshot = self._episodes.observe(~over)
-        info = self._episodes.info(snapshot)
         outcome.observation[over] = snapshot.observation[over]
-        final_info: dict[str, Any] = {
-            key: np.where(spread(over, rows), rows, np.zeros_like(rows)) for key, rows in outcome.info.items()
-        }
-        for key, rows in outcome.info.items():
-            rows[over] = info[key][over]
-        infos = masked(outcome.info, np.ones(self.num_envs, dtype=np.bool_))
-        infos.update(masked(drawn_only(info, outcome.info), over))
-        infos.update(final_obs=final_obs, _final_obs=over.copy(), final_info=masked(final_info, over))
-        infos["_final_info"] = over.copy()
+        final_info = masked(only(outcome.info, over), over)
+        info = restarted(outcome.info, self._episodes.info(snapshot), over)
+        infos = masked(info, np.ones(self.num_envs, dtype=np.bool_))
+        infos.update(final_obs=final_obs, _final_obs=over.copy(), final_info=final_info, _final_info=over.copy())
         return (*outcome[:4], infos)
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -225,7 +213,25 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
 
     def close_extras(self, **_kwargs: Any) -> None:
         """Closes the window, if there is one."""
-        self._viewer.close()
+        # Gymnasium 1.2 closes what is collected, even if its construction has failed.
+        if hasattr(self, "_viewer"):
+            self._viewer.close()
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """An attribute of every arm, or a method's answer, as `SyncVectorEnv` has it; the method is called once."""
+        return ask(self, name, *args, **kwargs)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of every arm, such as `action_space`, which is one arm's."""
+        return ask(self, name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Sets an attribute of all arms, such as `energy_weight`, to a value, or to equal ones in a list.
+
+        Raises AttributeError where there is no such attribute or it cannot be set, and ValueError for values that
+        differ between arms.
+        """
+        assign(self, name, values)
 
     def get_state(self) -> dict[str, Any]:
         """Everything that changes from step to step, the random generators included."""
@@ -247,23 +253,3 @@ class ElbowArmVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDAr
         self._over = np.array(state["over"], dtype=np.bool_)
         self._started = np.array(state["started"], dtype=np.bool_)
         self._viewer.restart()
-
-
-def spread(mask: Flags, rows: Array) -> Flags:
-    """The mask (B,) with trailing axes, so that it broadcasts against rows (B, ...)."""
-    return mask.reshape(-1, *([1] * (rows.ndim - 1)))
-
-
-def drawn_only(info: Mapping[str, Any], flows: Mapping[str, Any]) -> dict[str, Any]:
-    """Entries of a reset's info that a step's has not: the values that were drawn."""
-    return {key: rows for key, rows in info.items() if key not in flows}
-
-
-def masked(info: Mapping[str, Any], mask: Flags) -> dict[str, Any]:
-    """Gymnasium's vector info: each key beside its `_key` mask of the arms that have it, and so in dicts inside."""
-    full: dict[str, Any] = {
-        key: masked(cast("dict[str, Any]", rows), mask) if isinstance(rows, dict) else rows
-        for key, rows in info.items()
-    }
-    full.update({f"_{key}": mask.copy() for key in info})
-    return full

@@ -18,14 +18,12 @@ from agents.control.minimum_jerk import minimum_jerk
 from agents.control.posture import best_postures
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
 from elbow_gym.checks import positive
-from elbow_gym.env import ElbowArmEnv
+from elbow_gym.interface import Environment, Interface
 from elbow_gym.kinematics import HandPlacement
 from elbow_gym.parameters import ArmParameters
 from elbow_gym.task.circle import Circle
-from elbow_gym.vector_env import ElbowArmVectorEnv
 
 Array = NDArray[np.float64]
-Env = ElbowArmEnv | ElbowArmVectorEnv
 
 COMPUTED: dict[str, Any] = {
     "control_frequency": 500.0,
@@ -58,33 +56,27 @@ class Reference:
         reach_time: time from the start to the target [s].
     """
 
-    def __init__(self, env: Env, pose: ArrayLike | None, reach_time: float) -> None:
-        episodes = env.unwrapped.episodes
-        self._circle = episodes.targets if episodes.circle.random else episodes.circle
-        self._placement = HandPlacement(episodes.arm, episodes.pose if pose is None else pose)
-        self._period, self._reach_time = episodes.settings.control_period, positive("reach_time", reach_time)
+    def __init__(self, env: Environment, pose: ArrayLike | None, reach_time: float) -> None:
+        self._interface = interface = Interface(env)
+        self._placement = HandPlacement(interface.arm, interface.pose if pose is None else pose)
+        self._reach_time = positive("reach_time", reach_time)
         self._start: Array | None = None
         self._calls = 0
 
     def _desired(self, angle: Array) -> tuple[Array, Array, Array]:
         """q_d [rad] and q_d_dot [rad/s] at the angle, and the change of q_d_dot over 2 ANGLE_STEP around it [rad/s]."""
         angles = np.stack([angle, angle + ANGLE_STEP, angle - ANGLE_STEP])
-        if isinstance(self._circle, Circle):
-            position, velocity = self._circle.position(angles), self._circle.velocity(angles)
-        else:
-            position = np.stack([self._circle.position(one) for one in angles])
-            velocity = np.stack([self._circle.velocity(one) for one in angles])
-        q, q_dot = self._placement.joints(position, velocity)
+        q, q_dot = self._placement.joints(*self._interface.target(angles))
         return q[0], q_dot[0], q_dot[1] - q_dot[2]
 
     def next(self, angle: Array, q: Array) -> Motion:
         """Motion at this control period, for the target's angle on the circle [rad], (...), and q [rad], (..., n)."""
         if self._start is None:
             self._start = q
-        rate = np.asarray(self._circle.rate)[..., None]
+        rate = np.asarray(self._interface.target_rate)[..., None]
         q_d, q_d_dot, change = self._desired(angle)
         q_d_ddot = change * (rate / (2.0 * ANGLE_STEP))
-        blend, slope, curvature = minimum_jerk(self._calls * self._period / self._reach_time)
+        blend, slope, curvature = minimum_jerk(self._calls * self._interface.control_period / self._reach_time)
         slope, curvature = slope / self._reach_time, curvature / self._reach_time**2
         self._calls += 1
         way = q_d - self._start
@@ -98,23 +90,20 @@ class Reference:
 class _Following(ABC):
     """Base of the controllers, which observe the state, follow a reference and give clipped actions."""
 
-    def __init__(self, env: Env, pose: ArrayLike | None = None, reach_time: float = REACH_TIME) -> None:
-        episodes = env.unwrapped.episodes
-        self._layout, self._zero = episodes.layout, episodes.pose
-        self._volts, self._highest = episodes.volts_per_action, episodes.highest_action
-        self._period = episodes.settings.control_period
-        self._inverse = InverseDynamics(episodes.arm, episodes.settings.elbow_joints)
+    def __init__(self, env: Environment, pose: ArrayLike | None = None, reach_time: float = REACH_TIME) -> None:
+        self._interface = Interface(env)
+        self._inverse = InverseDynamics(self._interface.arm, self._interface.elbows)
         self._reference = Reference(env, pose, reach_time)
 
     def predict(
         self, observation: NDArray[np.float32], *_args: Any, **_kwargs: Any
     ) -> tuple[NDArray[np.float32], None]:
         """Actions (..., n) for observations (..., size); the first call is the episode's start."""
-        seen = self._layout.decode(observation)
-        q = seen["joint_angle"] + self._zero
-        wanted = self._reference.next(np.arctan2(seen["target_angle"][..., 1], seen["target_angle"][..., 0]), q)
-        voltage = self._voltage(wanted, q, seen["joint_velocity"], seen["current"])
-        return np.clip(voltage / self._volts, -self._highest, self._highest).astype(np.float32), None
+        observed = self._interface.decode(observation)
+        q = self._interface.joint_angles(observed)
+        wanted = self._reference.next(self._interface.target_angle(observed), q)
+        voltage = self._voltage(wanted, q, observed["joint_velocity"], observed["current"])
+        return self._interface.action(voltage), None
 
     @abstractmethod
     def _voltage(self, wanted: Motion, q: Array, q_dot: Array, current: Array) -> Array: ...
@@ -160,7 +149,7 @@ class ComputedTorque(_Following):
     def _voltage(self, wanted: Motion, q: Array, q_dot: Array, current: Array) -> Array:
         asked = wanted.q_ddot + 2.0 * BANDWIDTH * (wanted.q_dot - q_dot) + BANDWIDTH**2 * (wanted.q - q)
         drive = self._inverse.drive(q, q_dot, self._inverse.held_acceleration(q, q_dot, asked))
-        return self._inverse.held_voltage(q_dot, current, drive.current, self._period)
+        return self._inverse.held_voltage(q_dot, current, drive.current, self._interface.control_period)
 
 
 @cache
@@ -169,7 +158,7 @@ def economical_pose(arm: ArmParameters, elbows: tuple[int, ...], circle: Circle)
     return best_postures(arm, elbows, circle)[0].pose
 
 
-def economical_computed_torque(env: Env) -> ComputedTorque:
+def economical_computed_torque(env: Environment) -> ComputedTorque:
     """`ComputedTorque` that moves to `economical_pose` first."""
-    episodes = env.unwrapped.episodes
-    return ComputedTorque(env, economical_pose(episodes.arm, episodes.settings.elbow_joints, episodes.circle.widest))
+    interface = Interface(env)
+    return ComputedTorque(env, economical_pose(interface.arm, interface.elbows, interface.circle.widest))

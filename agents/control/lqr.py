@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.control.trajectory import Trajectory
-from elbow_gym.env import ElbowArmEnv
+from elbow_gym.interface import Environment, Interface
 from elbow_gym.kinematics import constraint_jacobian, hand_position
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.settings import Settings
-from elbow_gym.vector_env import ElbowArmVectorEnv
 
 Array = NDArray[np.float64]
 
@@ -39,28 +38,26 @@ class TimeVaryingLQR:
         ValueError: the trajectory has not one voltage for each of the environment's control periods.
     """
 
-    def __init__(self, env: ElbowArmEnv | ElbowArmVectorEnv, trajectory: Trajectory) -> None:
-        episodes = env.unwrapped.episodes
-        if len(trajectory.voltage) != episodes.settings.horizon:
-            raise ValueError(
-                f"trajectory must have {episodes.settings.horizon} control periods, got {len(trajectory.voltage)}"
-            )
-        self._layout, self._pose = episodes.layout, episodes.pose
-        self._volts, self._highest = episodes.volts_per_action, episodes.highest_action
+    def __init__(self, env: Environment, trajectory: Trajectory) -> None:
+        self._interface = Interface(env)
+        horizon = self._interface.horizon
+        if len(trajectory.voltage) != horizon:
+            raise ValueError(f"trajectory must have {horizon} control periods, got {len(trajectory.voltage)}")
         self._states = np.concatenate([trajectory.q, trajectory.q_dot, trajectory.current], axis=-1)
         self._voltage = trajectory.voltage
-        self.gains = lqr_gains(episodes.settings, trajectory)
+        self.gains = lqr_gains(self._interface.settings, trajectory)
         self._period = 0
 
     def predict(
         self, observation: NDArray[np.float32], *_args: Any, **_kwargs: Any
     ) -> tuple[NDArray[np.float32], None]:
         """Actions (..., n) for observations (..., size); the first call is the episode's start."""
-        seen, k = self._layout.decode(observation), self._period
-        state = np.concatenate([seen["joint_angle"] + self._pose, seen["joint_velocity"], seen["current"]], axis=-1)
+        observed, k = self._interface.decode(observation), self._period
+        q = self._interface.joint_angles(observed)
+        state = np.concatenate([q, observed["joint_velocity"], observed["current"]], axis=-1)
         voltage = self._voltage[k] - (state - self._states[k]) @ self.gains[k].T
         self._period += 1
-        return np.clip(voltage / self._volts, -self._highest, self._highest).astype(np.float32), None
+        return self._interface.action(voltage), None
 
     def restart(self) -> None:
         """Starts an episode: the next call of `predict` is its first."""

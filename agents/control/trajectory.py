@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.files import read_arrays, write_whole
-from elbow_gym.env import ElbowArmEnv
-from elbow_gym.vector_env import ElbowArmVectorEnv
+from elbow_gym.interface import Environment, Interface
 
 Array = NDArray[np.float64]
 
@@ -59,17 +58,14 @@ class OpenLoop:
         trajectory: the voltages.
     """
 
-    def __init__(self, env: ElbowArmEnv | ElbowArmVectorEnv, trajectory: Trajectory) -> None:
-        episodes = env.unwrapped.episodes
-        self._actions = np.clip(
-            trajectory.voltage / episodes.volts_per_action, -episodes.highest_action, episodes.highest_action
-        )
+    def __init__(self, env: Environment, trajectory: Trajectory) -> None:
+        self._actions = Interface(env).action(trajectory.voltage)
         self._steps = 0
 
     def predict(
         self, observation: NDArray[np.float32], *_args: Any, **_kwargs: Any
     ) -> tuple[NDArray[np.float32], None]:
         """Actions of the next control period (..., n) for observations (..., size); the first starts an episode."""
-        action = self._actions[self._steps].astype(np.float32)
+        action = self._actions[self._steps]
         self._steps += 1
         return np.broadcast_to(action, (*observation.shape[:-1], action.size)).copy(), None

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from agents.control.controller import Controller
 from elbow_gym.checks import as_numbers
+from elbow_gym.simulator import Simulator
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -111,21 +112,7 @@ def record_starts(
     series: dict[str, Any] = {}
 
     def keep(k: int, voltage: Array) -> None:
-        simulator = episodes.simulator
-        values = {
-            "q": simulator.q,
-            "q_dot": simulator.q_dot,
-            "hand": simulator.hand_position,
-            "target": episodes.target(),
-            "electrical_energy": simulator.electrical_energy,
-            "drawn_energy": simulator.drawn_energy,
-            "copper_loss": simulator.copper_loss,
-            "link_work": simulator.link_work,
-            "elbow_force": simulator.elbow_force,
-            "below_table": simulator.below_table,
-            "voltage": voltage,
-            "current": simulator.current,
-        }
+        values = {**instant(episodes.simulator), "target": episodes.target(), "voltage": voltage}
         for name, value in values.items():
             if name not in series:
                 series[name] = np.empty((horizon // every + 1, *value.shape))
@@ -152,6 +139,22 @@ def record_starts(
         own = {name: np.ascontiguousarray(values[:, mine]) for name, values in series.items()}
         recordings[start] = Recording(replace(settings, start=start), tuple(seeds), time, **own)
     return recordings
+
+
+def instant(simulator: Simulator) -> dict[str, Array]:
+    """Fields of a `Recording` that a simulator shows by itself, as they are now; each with the arms first."""
+    return {
+        "q": simulator.q,
+        "q_dot": simulator.q_dot,
+        "hand": simulator.hand_position,
+        "electrical_energy": simulator.electrical_energy,
+        "drawn_energy": simulator.drawn_energy,
+        "copper_loss": simulator.copper_loss,
+        "link_work": simulator.link_work,
+        "elbow_force": simulator.elbow_force,
+        "below_table": simulator.below_table,
+        "current": simulator.current,
+    }
 
 
 def _started(

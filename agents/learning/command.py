@@ -118,7 +118,7 @@ def train_command(words: Sequence[str]) -> Callable[..., None]:
         """
         from agents.learning.train import train_all
 
-        runs = runs_of(task, run, algorithm, spelled("python -m agents train", words))
+        runs = runs_of(task, run, algorithm, spelled("agents", "train", words))
         names = " to ".join(dict.fromkeys((runs[0].name, runs[-1].name)))
         print(f"{names}, into {run.output}: {algorithm}", flush=True)
         train_all(runs, run.workers, run.resume)
@@ -145,7 +145,7 @@ def clone_command(words: Sequence[str]) -> Callable[..., None]:
         settings = Settings(elbows=teacher.elbows)
         folders = [run.output / f"clone_elbows{teacher.elbows}_seed{seed}" for seed in run.all]
         source = OPTIMA / f"elbows{teacher.elbows}.npz" if teacher.trajectory is None else teacher.trajectory
-        command = spelled("python -m agents clone", words)
+        command = spelled("agents", "clone", words)
         results = clone_all(settings, source, imitation, list(run.all), folders, command, run.resume)
         for result in results.values():
             print(f"{result['name']}: {result['training_seconds']:.0f} s, return {result['best']['return']:.2f}")

@@ -12,6 +12,7 @@ from agents.control.classical import ComputedTorque
 from agents.learning.actor import actor_layers
 from agents.learning.sac.settings import SACSettings
 from elbow_gym.baselines.policy import Policy
+from elbow_gym.interface import Interface
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 
@@ -63,12 +64,13 @@ def fill(
     rng = np.random.default_rng(seed)
     monitored = model.get_env()
     observation = monitored.reset()
-    shape, k = (env.num_envs, env.episodes.arm.n_joints), 0
+    interface, k = Interface(env), 0
+    shape = (env.num_envs, interface.arm.n_joints)
     controller, strength = ComputedTorque(env), np.zeros((env.num_envs, 1))
     seen: list[NDArray[np.float32]] = []
     done: list[NDArray[np.float32]] = []
     while model.num_timesteps < sac.learning_starts:
-        if k % env.settings.horizon == 0:
+        if k % interface.horizon == 0:
             # It counts the time by its calls; all arms start and end together.
             controller = ComputedTorque(env)
             strength = 2.0 * sac.warm_start_noise * rng.random((env.num_envs, 1))
@@ -76,7 +78,7 @@ def fill(
             calm = controller.predict(observation)[0]
             seen.append(observation)
             done.append(model.policy.scale_action(calm))
-            action = calm + env.episodes.highest_action * strength * rng.normal(size=shape)
+            action = calm + interface.highest_action * strength * rng.normal(size=shape)
             action = np.clip(action, monitored.action_space.low, monitored.action_space.high).astype(np.float32)
         else:
             action = model.predict(observation, deterministic=False)[0]

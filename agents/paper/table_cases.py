@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from agents.evaluation.metrics import metrics
-from agents.evaluation.recording import Array, Recording
+from agents.evaluation.recording import Array, Recording, instant
 from agents.paper.cases import RECORD_PERIOD
 from agents.paper.figures import SETTLED
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
 from elbow_gym.kinematics import hand_position, inverse_kinematics, joint_positions
 from elbow_gym.parameters import ArmParameters
+from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.settings import Settings
 
@@ -111,7 +112,7 @@ def play_on_table(
     """
     arm, circle, period = settings.parsed_arm, settings.parsed_circle, settings.control_period
     steps = replace(settings, table=table).substeps
-    simulator = Simulator(arm, 0, len(poses), timestep=float(steps.min()), table=table)
+    simulator = Simulator(arm, 0, len(poses), conditions=Conditions(table=table), timestep=float(steps.min()))
     time = np.arange(settings.horizon + 1) * period
     angle = circle.angle(time, 0.0)
     target, velocity = circle.position(angle), circle.velocity(angle)
@@ -139,21 +140,9 @@ def play_on_table(
 
 
 def _instant(simulator: Simulator) -> dict[str, Array]:
-    views = {
-        "q": simulator.q,
-        "q_dot": simulator.q_dot,
-        "hand": simulator.hand_position,
-        "electrical_energy": simulator.electrical_energy,
-        "drawn_energy": simulator.drawn_energy,
-        "copper_loss": simulator.copper_loss,
-        "link_work": simulator.link_work,
-        "elbow_force": simulator.elbow_force,
-        "below_table": simulator.below_table,
-        "current": simulator.current,
-    }
     forces = simulator.contact_force[..., 2]
     return {
-        **{name: view.copy() for name, view in views.items()},
+        **{name: view.copy() for name, view in instant(simulator).items()},
         "normal_force": forces,
         "contact_loss": simulator.contact_loss.sum(axis=1),
     }

@@ -14,17 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from agents.cli import spelled
 from agents.evaluation.metrics import REGIMES, UNITS
 from agents.evaluation.players import Player
 from agents.evaluation.regimes import BENCHMARK_SEEDS, SHIFTED, in_all_regimes
 from agents.files import check_writable, write_text, write_whole
 from agents.workers import Job, Tell, compile_before, counted, in_processes
 from benchmarks import learning
+from benchmarks.blocks import publish_blocks
 from benchmarks.energy import breakdown, cache, pareto, terminal
 from benchmarks.energy import figures as energy_figure
 from benchmarks.energy import markdown as energy_table
-from benchmarks.energy.blocks import publish_blocks
 from benchmarks.energy.cache import Results
 from benchmarks.energy.cells import PARTS, Cell, cells, players, sweep, work
 from benchmarks.energy.rows import Row
@@ -181,7 +180,7 @@ def batches(todo: Sequence[Cell], plan: Plan) -> list[tuple[Any, int]]:
     return found
 
 
-def save(rows: Sequence[Row], plan: Plan, seconds: float, folder: Path) -> None:
+def save(rows: Sequence[Row], plan: Plan, seconds: float, folder: Path, command: str = "") -> None:
     """Writes the tables, the figures and what made them, each file whole.
 
     energy.csv, .md, .png and .json of the nominal part; of a full run also energy_short.md and energy_brief.md for the
@@ -197,7 +196,7 @@ def save(rows: Sequence[Row], plan: Plan, seconds: float, folder: Path) -> None:
             energy_table.write_rows(chosen, folder / f"{stem}.csv")
             write_text(folder / f"{stem}.md", energy_table.markdown(chosen))
     context = {
-        "command": spelled("python -m benchmarks", sys.argv[1:]),
+        "command": command,
         "made": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "seconds": round(seconds, 1),
         "seeds": list(plan.seeds),
@@ -232,6 +231,7 @@ def energy(
     publish: bool = False,
     folder: Path = CACHE,
     parallel: bool = True,
+    command: str = "",
 ) -> list[Row]:
     """Runs the comparison, writes the results and prints the report. Returns the rows.
 
@@ -243,6 +243,7 @@ def energy(
         publish: a full run whose results go to benchmarks/results, and their tables into the READMEs.
         folder: where results of single cells are kept.
         parallel: one cell on each core.
+        command: the command line, for energy.json.
     """
     started = time.monotonic()
     chosen = plan(full or publish, episodes, folder=folder, fresh=fresh)
@@ -250,7 +251,7 @@ def energy(
     for place in (output, folder):
         check_writable(place)
     rows = measure(chosen, parallel)
-    save(rows, chosen, time.monotonic() - started, output)
+    save(rows, chosen, time.monotonic() - started, output, command)
     changed = publish_blocks(output) if publish else []
     print(terminal.report(rows, len(chosen.seeds), chosen.every_seed, [output, *changed]))
     return rows

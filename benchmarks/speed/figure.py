@@ -1,4 +1,4 @@
-"""Figure of the speed benchmark: an RK4 step by contender, and its time against the number of joints."""
+"""Figures of the speed benchmark: a step by contender and number of joints, and work and precision."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from agents.style import pyplot
-from benchmarks.speed.own import CASES, EULER_STEP, OURS, PAPER, PAPER_CASE, RK4_STEP
+from benchmarks.speed.markdown import EQUAL_COST
+from benchmarks.speed.own import CASES, EULER_STEP, EXPONENTIAL_STEP, OURS, PAPER, PAPER_CASE, RK4_STEP
 from benchmarks.speed.peers import C_LOOP, MUJOCO, PINOCCHIO
+from benchmarks.speed.precision import BATCH, ERROR, GROWING
 
 if TYPE_CHECKING:
+    from benchmarks.speed.precision import Method
     from benchmarks.speed.rows import Row
 
 # Okabe and Ito's palette.
@@ -24,13 +27,15 @@ LINES = (
 
 
 def figure(rows: Sequence[Row], path: Path) -> None:
-    """Bars of the time per step of the paper's arm with two elbows, and lines over 4 to 40 joints."""
+    """Bars of the CPU time per step of the paper's arm with two elbows, and lines over 4 to 40 joints."""
     plt = pyplot()
     fig, (left, right) = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained", width_ratios=(1.25, 1))
     steps = [
         row
         for row in rows
-        if row.contender.unit in {RK4_STEP, EULER_STEP} and (row.contender.joints, row.contender.elbows) == PAPER_CASE
+        if row.contender.unit in {RK4_STEP, EXPONENTIAL_STEP, EULER_STEP}
+        and (row.contender.joints, row.contender.elbows) == PAPER_CASE
+        and row.contender.clock == "cpu"
     ]
     steps.sort(key=lambda row: -row.median)
     for place, row in enumerate(steps):
@@ -44,8 +49,8 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     if steps:
         left.set_xlim(min(row.median for row in steps) * 1e6 / 3.0, max(row.median for row in steps) * 8e6)
     left.grid(axis="y", visible=False)
-    left.set_xlabel("time per step and arm (µs)")
-    left.set_title("One step of the ten-joint arm with two elbows", fontsize=9)
+    left.set_xlabel("CPU time per step and arm (µs)")
+    left.set_title(f"One step of the ten-joint arm with two elbows\n({EQUAL_COST})", fontsize=9)
 
     sizes = sorted(
         (joints, elbows) for joints, elbows in CASES if joints != PAPER_CASE[0] or (joints, elbows) == PAPER_CASE
@@ -65,8 +70,8 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     right.set_xticks([joints for joints, _ in sizes], [str(joints) for joints, _ in sizes])
     right.minorticks_off()
     right.set_xlabel("joints")
-    right.set_ylabel("time per step and arm (µs)")
-    right.set_title("Cost against the number of joints (elbows on the table)", fontsize=9)
+    right.set_ylabel("CPU time per step and arm (µs)")
+    right.set_title(f"One step by number of joints, with elbows\n({EQUAL_COST})", fontsize=9)
     for axis in (left.xaxis, right.yaxis):
         axis.set_major_formatter(lambda value, _: f"{value:,.10g}")
     handles, labels = right.get_legend_handles_labels()
@@ -75,7 +80,48 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     plt.close(fig)
 
 
+LOOKS = {
+    (OURS, GROWING, BATCH): ("#0072B2", "D", "-"),
+    (OURS, GROWING, 1): ("#56B4E9", "D", "-"),
+    (OURS, "exponential", 1): ("#009E73", "o", "-"),
+    (OURS, "rk4", 1): ("#CC79A7", "s", "--"),
+    (MUJOCO, "Euler", 1): ("#E69F00", "v", "-"),
+    (MUJOCO, "implicitfast", 1): ("#D55E00", "+", ":"),
+    (MUJOCO, "RK4", 1): ("#000000", "^", "--"),
+}
+"""Colour, marker and line of each method."""
+
+
+def work_precision(methods: Sequence[Method], path: Path) -> None:
+    """Errors of the state and of the energy after a simulated second against its CPU time, a line per method."""
+    plt = pyplot()
+    fig, axes = plt.subplots(1, 2, figsize=(11, 4.4), layout="constrained", sharex=True)
+    for method in methods:
+        colour, marker, style = LOOKS[method.family, method.integrator, method.arms]
+        arms = "" if method.family == MUJOCO else f", batch of {method.arms}" if method.arms > 1 else ", single arm"
+        label = f"{method.family}, {method.integrator}{arms}, order {method.order:.1f}"
+        times = [1e3 * point.time for point in method.points]
+        for axis, errors in zip(
+            axes,
+            ([p.state_error for p in method.points], [p.energy_error for p in method.points]),
+            strict=True,
+        ):
+            axis.plot(times, errors, color=colour, marker=marker, ls=style, label=label, mfc="none")
+    for axis, quantity in zip(axes, ("state", "electrical energy"), strict=True):
+        axis.axhline(ERROR, color="#666666", lw=1.0, ls=":")
+        axis.set_xscale("log")
+        axis.set_yscale("log")
+        axis.set_xlabel("CPU time of one arm's simulated second (ms)")
+        axis.set_ylabel(f"relative error of the {quantity} (-)")
+        axis.xaxis.set_major_formatter(lambda value, _: f"{value:,.10g}")
+    fig.suptitle("Ten-joint arm without elbows, random voltages held for 20 ms; longest steps on the left", fontsize=9)
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    fig.savefig(path)
+    plt.close(fig)
+
+
 def _label(row: Row) -> str:
     who = row.contender
-    kind = "" if who.unit == RK4_STEP and who.family != MUJOCO else f", {who.unit.removesuffix(' step')}"
+    plain = who.unit == RK4_STEP and who.family not in {MUJOCO, OURS}
+    kind = "" if plain else f", {who.unit.removesuffix(' step')}"
     return f"{who.family}{kind}\n{who.name}" if who.family == PAPER else f"{who.family}{kind}, {who.name}"

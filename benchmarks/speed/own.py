@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,9 @@ TIMESTEP = 0.001
 BATCH = 1024
 OURS, PAPER = "elbow_gym", "the paper in NumPy"
 EVALUATION, RK4_STEP, EULER_STEP, ENV_STEP = "evaluation", "RK4 step", "Euler step", "env step"
+EXPONENTIAL_STEP = "exponential step"
+OWN_STEPS = {RK4_STEP: "rk4", EXPONENTIAL_STEP: "exponential"}
+"""Integrator of each of this project's steps."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +124,17 @@ def kernel_accelerations(
     return evaluate, q_ddot, current_dot
 
 
+def compilations() -> list[Callable[[], None]]:
+    """Calls that compile what the contenders call, a lane count and an integrator each."""
+
+    def compile_one(arms: int, unit: str) -> None:
+        _step(*PAPER_CASE, arms, unit)
+        if unit == EXPONENTIAL_STEP:
+            _evaluation(*PAPER_CASE, arms)
+
+    return [partial(compile_one, arms, unit) for arms in (1, BATCH) for unit in OWN_STEPS]
+
+
 def start_state(arm: ArmParameters, elbows: tuple[int, ...], num_envs: int) -> Array:
     """States (B, 3, n) at rest and without current: q, q_dot, current."""
     state = np.zeros((num_envs, 3, arm.n_joints))
@@ -135,11 +150,20 @@ def _evaluation(joints: int, elbows: int, arms: int) -> Sampler:
     return timed(lambda: [evaluate() for _ in range(calls)], calls * arms)
 
 
-def _rk4(joints: int, elbows: int, arms: int, threads: int = 1, clock: str = "cpu", parts: int = 1) -> Sampler:
+def _step(
+    joints: int,
+    elbows: int,
+    arms: int,
+    unit: str = RK4_STEP,
+    threads: int = 1,
+    clock: str = "cpu",
+    parts: int = 1,
+) -> Sampler:
     from elbow_gym.simulator import Simulator
 
     arm = chain(joints)
-    simulator = Simulator(arm, ELBOWS[elbows], arms, timestep=TIMESTEP, integrator="rk4", num_threads=threads)
+    how: dict[str, Any] = {"integrator": OWN_STEPS[unit], "num_threads": threads}
+    simulator = Simulator(arm, ELBOWS[elbows], arms, timestep=TIMESTEP, **how)
     simulator.reset(start_poses(arm, ELBOWS[elbows], arms))
     start, volts = simulator.get_state(), voltages(arms, joints)
     substeps = 500 if arms == 1 else 50
@@ -174,7 +198,7 @@ def _reference(joints: int, elbows: int, stepping: bool) -> Sampler:
 
 
 def own_contenders() -> list[Contender]:
-    """The kernel's evaluations, the simulator's RK4 steps, and the paper's method."""
+    """The kernel's evaluations, the simulator's steps, and the paper's method."""
     found: list[Contender] = []
     for joints, elbows in (*CASES, MOST_ELBOWS):
         arm: dict[str, Any] = {"joints": joints, "elbows": elbows}
@@ -195,23 +219,24 @@ def own_contenders() -> list[Contender]:
                 family=OURS,
                 name="quarter of an RK4 step, batch",
                 unit=EVALUATION,
-                make=lambda _, a=arm: _rk4(**a, arms=BATCH, parts=4),
+                make=lambda _, a=arm: _step(**a, arms=BATCH, parts=4),
                 arms=BATCH,
                 **arm,
             )
         )
-        for name, arms, threads in (("single arm", 1, 1), ("batch", BATCH, 1), ("batch, 2 threads", BATCH, 2)):
-            how: dict[str, Any] = {"arms": arms, "threads": threads, "clock": "cpu" if threads == 1 else "wall"}
-            found.append(
-                Contender(
-                    family=OURS,
-                    name=name,
-                    unit=RK4_STEP,
-                    make=lambda _, a=arm, how=how: _rk4(**a, **how),
-                    **arm,
-                    **how,
+        for unit in (RK4_STEP, EXPONENTIAL_STEP) if (joints, elbows) == PAPER_CASE else (RK4_STEP,):
+            for name, arms, threads in (("single arm", 1, 1), ("batch", BATCH, 1), ("batch, 2 threads", BATCH, 2)):
+                how: dict[str, Any] = {"arms": arms, "threads": threads, "clock": "cpu" if threads == 1 else "wall"}
+                found.append(
+                    Contender(
+                        family=OURS,
+                        name=name,
+                        unit=unit,
+                        make=lambda _, a=arm, u=unit, how=how: _step(**a, unit=u, **how),
+                        **arm,
+                        **how,
+                    )
                 )
-            )
     for joints, elbows in ((10, 0), PAPER_CASE):
         for unit in (EVALUATION, RK4_STEP) if elbows else (EVALUATION,):
             found.append(

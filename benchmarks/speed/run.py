@@ -14,10 +14,13 @@ from typing import Any
 
 from agents.files import write_csv, write_text, write_whole
 from agents.workers import compile_before
-from benchmarks.machine import PACKAGES, RESULTS, machine, versions
-from benchmarks.speed.environments import START, environment_contenders
-from benchmarks.speed.own import Contender, Sampler, own_contenders
+from benchmarks.blocks import publish_blocks
+from benchmarks.machine import LATEST_SPEED, PACKAGES, RESULTS, machine, versions
+from benchmarks.speed import markdown
+from benchmarks.speed.environments import environment_contenders
+from benchmarks.speed.own import Contender, Sampler, compilations, own_contenders
 from benchmarks.speed.peers import MUJOCO, check_agreement, peer_contenders
+from benchmarks.speed.precision import TRUE_STEPS, Point, errors, methods, points, trials, truth
 from benchmarks.speed.rows import RATIO, Row, ratios
 from elbow_gym.task.settings import Settings
 
@@ -94,70 +97,28 @@ def planned(contender: Contender, quick: bool) -> float:
     return contender.seconds or SECONDS
 
 
-HEADER = (
-    "who",
-    "what",
-    "unit",
-    "joints",
-    "elbows",
-    "arms",
-    "threads",
-    "clock",
-    "time",
-    "quartiles",
-    "per second",
-    RATIO,
-)
-
-
-def duration(seconds: float) -> str:
-    """A time with its unit, to three or four digits."""
-    for scale, unit in ((1e6, "us"), (1e3, "ms")):
-        if seconds * scale < 1000.0:
-            return f"{seconds * scale:.3g} {unit}"
-    return f"{seconds:.3g} s"
-
-
-def shown(row: Row, ratio: float | None) -> tuple[str, ...]:
-    """A row's cells under HEADER."""
-    contender, (low, median, high) = row.contender, row.quartiles
-    counts = (contender.joints, contender.elbows, contender.arms, contender.threads)
-    return (
-        contender.family,
-        contender.name,
-        contender.unit,
-        *("-" if count is None else str(count) for count in counts),
-        contender.clock,
-        duration(median),
-        f"{duration(low)} to {duration(high)}",
-        "-" if contender.unit == START else f"{1.0 / median:,.0f}",
-        "-" if ratio is None else f"{ratio:.3g}",
-    )
-
-
-def markdown(rows: Sequence[Row]) -> str:
-    """The table for a README."""
-    lines = [HEADER, ("---",) * len(HEADER)]
-    lines += [shown(row, ratio) for row, ratio in zip(rows, ratios(rows), strict=True)]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
-
-
 def table(rows: Sequence[Row]) -> Any:
     """Table for the terminal."""
     from rich.table import Table
 
-    body = Table(title="Time per unit and arm: median and quartiles")
-    for name in HEADER:
-        body.add_column(name, justify="left" if name in HEADER[:3] else "right", no_wrap=True)
+    header = markdown.HEADER
+    title = f"Time per unit and arm: median and quartiles. Against MuJoCo's RK4 step: {markdown.EQUAL_COST}"
+    body = Table(title=title)
+    for name in header:
+        body.add_column(name, justify="left" if name in header[:3] else "right", no_wrap=True)
     for k, (row, ratio) in enumerate(zip(rows, ratios(rows), strict=True)):
         ends = k + 1 == len(rows) or rows[k + 1].contender.family != row.contender.family
-        body.add_row(*shown(row, ratio), end_section=ends)
+        body.add_row(*markdown.shown(row, ratio), end_section=ends)
     return body
 
 
-def save(rows: Sequence[Row], context: dict[str, Any], folder: Path) -> None:
-    """Writes speed.csv, speed.json, speed.md and speed.png, each whole or not at all."""
-    from benchmarks.speed.figure import figure
+def save(rows: Sequence[Row], found: Sequence[Point], context: dict[str, Any], folder: Path) -> None:
+    """Writes the results, each file whole or not at all.
+
+    speed.csv, speed.json, speed.md and speed.png; speed_brief.md and precision.md for a README; precision.csv and
+    precision.png.
+    """
+    from benchmarks.speed.figure import figure, work_precision
 
     header = ["who", "what", "unit", "joints", "elbows", "arms", "threads", "clock"]
     header += ["median [us]", "lower quartile [us]", "upper quartile [us]", "samples", RATIO]
@@ -170,26 +131,42 @@ def save(rows: Sequence[Row], context: dict[str, Any], folder: Path) -> None:
         body.append(["" if cell is None else cell for cell in cells])
     write_csv(folder / "speed.csv", header, body)
     write_text(folder / "speed.json", json.dumps(context, indent=2) + "\n")
-    write_text(folder / "speed.md", markdown(rows))
+    write_text(folder / "speed.md", markdown.markdown(rows))
+    write_text(folder / "speed_brief.md", markdown.brief(rows))
     write_whole(folder / "speed.png", lambda temporary: figure(rows, temporary))
+    header = ["who", "integrator", "arms", "steps in a control period", "longest step [ms]", "CPU time [ms]"]
+    header += ["median CPU time [ms]", "samples", "state error [-]", "energy error [-]"]
+    body = [
+        [point.trial.family, point.trial.integrator, point.trial.arms, point.trial.substeps]
+        + [f"{1e3 * value:.6g}" for value in (point.trial.steps.max(), point.time, point.row.median)]
+        + [len(point.row.samples), f"{point.state_error:.4g}", f"{point.energy_error:.4g}"]
+        for point in found
+    ]
+    write_csv(folder / "precision.csv", header, body)
+    write_text(folder / "precision.md", markdown.precision(methods(found)))
+    write_whole(folder / "precision.png", lambda temporary: work_precision(methods(found), temporary))
 
 
-def speed(output: Path = RESULTS, quick: bool = False) -> list[Row]:
-    """Runs the comparison, prints the table and writes the results. Returns the rows.
+def speed(output: Path = LATEST_SPEED, quick: bool = False, publish: bool = False, command: str = "") -> list[Row]:
+    """Runs the comparison, prints the tables and writes the results. Returns the rows.
 
     Args:
-        output: folder for the results.
+        output: folder for the results, unless they are published.
         quick: take few and short samples, which show that everything runs; the times mean little then.
+        publish: write the results to benchmarks/results, and their tables into the READMEs. ValueError if `quick`.
+        command: the command line, for speed.json.
     """
+    if quick and publish:
+        raise ValueError("publish must be False for a quick run, whose times mean little, got True")
     from rich.console import Console
     from tqdm import tqdm
 
     started, load = time.monotonic(), os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-    compile_before([(Settings(), 1), Settings()])
+    compile_before([(Settings(), 1), Settings()], compilations())
     differences = check_agreement()
-    chosen = contenders(quick)
-    rounds = QUICK_ROUNDS if quick else ROUNDS
-    work = sum(planned(c, quick) * (rounds if c.rounds is None else 1 if quick else c.rounds) for c in chosen)
+    chosen, seconds = contenders(quick), {trial: trial.contender() for trial in trials(quick)}
+    rounds, every = QUICK_ROUNDS if quick else ROUNDS, [*chosen, *seconds.values()]
+    work = sum(planned(c, quick) * (rounds if c.rounds is None else 1 if quick else c.rounds) for c in every)
     # Counted in seconds of planned work, so that the time left is about right.
     form = "{desc:<60.60} {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
     with tqdm(total=work, file=sys.stderr, bar_format=form) as bar:
@@ -199,8 +176,10 @@ def speed(output: Path = RESULTS, quick: bool = False) -> list[Row]:
             bar.update(min(seconds, work - bar.n))
 
         rows, skipped = measure(chosen, quick, progress)
+        timings, _ = measure(list(seconds.values()), quick, progress)
+    found = points(list(seconds), timings)
     context = {
-        "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
+        "command": command,
         "made": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "seconds": round(time.monotonic() - started, 1),
         "machine": {
@@ -213,8 +192,14 @@ def speed(output: Path = RESULTS, quick: bool = False) -> list[Row]:
         "seconds_per_sample": QUICK_SECONDS if quick else SECONDS,
         "relative_difference_to_the_kernel": differences,
         "skipped": skipped,
+        "precision": {
+            "reference": f"exponential, {TRUE_STEPS} steps in a control period",
+            "state and energy error of as many steps of rk4": errors(truth("rk4"), truth()),
+        },
     }
-    save(rows, context, output)
+    output = RESULTS if publish else output
+    save(rows, found, context, output)
+    changed = publish_blocks(output) if publish else []
     # Wider than a pipe's 80 columns, which would cut the figures.
     console = Console(width=max(Console().width, 190))
     console.print(table(rows))
@@ -223,5 +208,7 @@ def speed(output: Path = RESULTS, quick: bool = False) -> list[Row]:
     for case, difference in differences.items():
         soft = " (soft contacts)" if case.startswith(MUJOCO) and not case.endswith(" 0 elbows") else ""
         console.print(f"Accelerations against the kernel's, {case}: {difference:.1e}{soft}", highlight=False)
-    console.print(f"Written: {output / 'speed.csv'}, speed.json, speed.md, speed.png", highlight=False)
+    console.print("Work and precision of a simulated second without elbows:")
+    console.print(markdown.precision(methods(found)), highlight=False, markup=False)
+    console.print(f"Written: {', '.join(map(str, [output, *changed]))}", highlight=False)
     return rows

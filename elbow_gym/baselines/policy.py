@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from elbow_gym.baselines.policy_card import PolicyCard, read_card
 from elbow_gym.baselines.tasks import task_name
 from elbow_gym.env import ElbowArmEnv
+from elbow_gym.interface import Interface
 from elbow_gym.task.observation import OBSERVATION_VERSION
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
@@ -70,14 +71,15 @@ class Policy:
             raise ValueError(
                 f"observation_version of the policy must be {OBSERVATION_VERSION}, got {self.card.observation_version}"
             )
-        given = _own_environment(env)
-        names = given.observation_names
+        interface = Interface(_own_environment(env))
+        names = interface.layout.names
         if self.card.observation != names:
             raise ValueError(
                 f"observation of the policy must be the environment's {names}, got {self.card.observation}"
             )
+        trained_in = self.settings
         for name in ("elbow_joints", "action_unit", "voltage_limit", "control_frequency"):
-            trained, found = getattr(self.settings, name), getattr(given.settings, name)
+            trained, found = getattr(trained_in, name), getattr(interface.settings, name)
             if trained != found:
                 raise ValueError(f"{name} of the environment must be {trained!r} as in training, got {found!r}")
 
@@ -182,6 +184,14 @@ def load_policy(source: str | Path, elbows: int | None = None, env: str | None =
         ValueError: there is no such policy, or its files do not fit each other.
     """
     if elbows is None and env is None:
+        counts = sorted(
+            name.removeprefix(f"{source}_elbows") for name in baseline_names() if f"{source}_elbows" in name
+        )
+        if counts and not pair(Path(source))[0].is_file():
+            known = f"elbows={' or elbows='.join(counts)}"
+            raise ValueError(
+                f"elbows or env must be given for the baselines {str(source)!r}, such as {known}, got neither"
+            )
         return read_policy(Path(source))
     return read_policy(baseline_path(f"{source}_{task_name(env or 'ElbowArm-v0', elbows)}"))
 

@@ -6,13 +6,13 @@ turns with the yaw. In it link a has the direction e = (sin phi, cos phi) and th
 Motors sit between links: their torque u = K_m i - (D + D_m) q_dot and their rotors' inertia J act on the relative
 angle q_a = phi_a - phi_(a-1).
 
-Yaw. It is coupled to the pitches by velocities alone, so its acceleration stands apart:
+Yaw. It is coupled to the pitches by velocities alone, so its acceleration is found apart:
 
     (I_psi + J_1) psi_ddot = u_1 - I_psi_dot psi_dot,    I_psi = I_s1 + sum of m rho_c^2 + I_t sin^2 phi + I_s cos^2 phi
 
 with rho_c the radius of a link's centre of mass. Outward, I_psi and its rate are summed together with positions.
 
-Pitches. The rest of the arm beyond a joint, seen by the parent's motion (A_rho, A_z, alpha_parent), is a linear law:
+Pitches. The rest of the arm beyond a joint answers the parent's motion (A_rho, A_z, alpha_parent) by a linear law:
 the force and torque it takes are K (A, alpha) + b, with a symmetric 3x3 matrix K and a vector b. K and b of the payload
 start the recursion. For a link let c = -l e w^2 be the acceleration of its end by its own turning and h = b + K (c, 0).
 With forces f and torque 3 as indices, g = K_ff e' + K_f3, and the inertias of a rod about its joint,

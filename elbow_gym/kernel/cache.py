@@ -9,7 +9,7 @@ from elbow_gym.kernel.observe import path
 from elbow_gym.kernel.template import sources
 
 NAME = re.compile(r"[a-z_0-9]+\.\w+_([0-9a-f]{10})-\d+\.py\d+\.(?:nbi|\d+\.nbc)")
-"""An entry's file: module, name with the digest of the sources, line, Python and kind."""
+"""Name of an entry's file: module, name with the digest of the sources, line, Python and kind."""
 
 
 def folder() -> Path | None:

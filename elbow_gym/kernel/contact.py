@@ -14,7 +14,7 @@ from elbow_gym.kernel.template import template
 
 @template(inlined=True)
 def table_contact(ws, here, k, rho, rhod, z, zd):
-    """The compliant table's force on the end of a link, the torque about the yaw so far, and the power lost.
+    """Force of the compliant table on a link's end [N], its torque about the yaw so far [N m], and the power lost [W].
 
     Reads: STIFFNESS, DISSIPATION, TABLE_FRICTION, FRICTION_SPEED, PSI_DOT, TWIST.
     Writes: CONTACT_R, CONTACT_T, CONTACT_N, PSI_DOT, Z_DOT, TWIST, LOSS.
@@ -39,7 +39,7 @@ def table_contact(ws, here, k, rho, rhod, z, zd):
 
 @template(inlined=True)
 def gear_friction(ws, here, k):
-    """Torque of the gear's Coulomb friction along the joint's motion.
+    """Torque of a gear's Coulomb friction at the joint [N m], positive along the joint's motion.
 
     Reads: Q_DOT, COULOMB.
     Writes: GEAR.

@@ -1,4 +1,4 @@
-"""Runs of arms under constant voltages, and control periods: volts of actions, steps, observations and rewards."""
+"""Runs of arms under constant voltages, and control periods from actions to observations and rewards."""
 
 # pyright: basic
 
@@ -14,7 +14,7 @@ from elbow_gym.kernel.template import template
 
 @template(flat=True)
 def run(state, parameters, voltage, elbows, steps, summary, first, end):
-    """Arms first..end-1 through steps of given lengths; returns the number of those that were not representable.
+    """Arms first..end-1 through steps of given lengths; returns the number of those that are not VALID.
 
     Writes: BELOW.
     """

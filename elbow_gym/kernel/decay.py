@@ -1,4 +1,4 @@
-"""Decay of the currents over a step: e^-z and the phi functions of z = h R / L, and what the current is made of."""
+"""Decay of the currents over a step: e^-z, the phi functions of z = h R / L, and the currents' coefficients."""
 
 # pyright: basic
 
@@ -36,7 +36,7 @@ def phi_4(z):
 
 @template
 def current_coefficients(ws, n, step):
-    """What the currents of a step of a given length [s] are made of, at the windings' present resistance.
+    """Coefficients of the currents over a step of a given length [s], at the windings' present resistance.
 
     Reads: RESISTANCE, INVERSE_L, TEMPERATURE, WARMING.
     Writes: DECAY, HALF_DECAY, HALF_GAIN, END_0, END_MID, END_1, MEAN_DECAY, MEAN_0, MEAN_MID, MEAN_1, START_R.

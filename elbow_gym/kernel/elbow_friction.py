@@ -15,7 +15,7 @@ from elbow_gym.kernel.template import template
 
 @template
 def friction_response(ws, shared, lanes, elbow, j):
-    """Friction per projection_step of an elbow's force, and x, the recursion's answer to its radial part.
+    """Friction per newton of an elbow's force [-], and x, the recursion's answer to its radial part.
 
     Reads: Q_DOT, ROTOR, RHO, RHO_DOT, ER, EZ, D, ELBOW_FRICTION, IR3, IZ3, CR, CZ, C3.
     Writes: CR, CZ, C3, X, SLIDE_R, SLIDE_T.
@@ -48,7 +48,7 @@ def friction_response(ws, shared, lanes, elbow, j):
 
 @template
 def friction_coupling(ws, shared, lanes, elbows):
-    """Keeps the matrix and the free accelerations, and finds what friction adds: the rise at i for a newton on j.
+    """Keeps the matrix and the free accelerations, and finds what friction adds to it: the rise at i for a newton on j.
 
     Reads: D, Y, X, FORCES, COUPLING.
     Writes: MATRIX, COUPLING, FREE_RISE.
@@ -74,7 +74,7 @@ def friction_coupling(ws, shared, lanes, elbows):
 
 @template
 def apply_friction(ws, shared, lanes, tip, elbows):
-    """Puts the friction that was found on the arm and its loss on the meter; what is left to solve is the forces.
+    """Adds the friction that was found to the bias, and its loss to the meters; the normal forces are left to solve.
 
     Reads: Q_DOT, RHO, RHO_DOT, TWIST, LOSS, R, X, FORCES, MATRIX, COUPLING, FREE_RISE, SLIDE_R, SLIDE_T, PUSH,
         PUSH_LIMIT.

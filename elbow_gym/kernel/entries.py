@@ -60,7 +60,7 @@ def accelerations(state, parameters, voltage, elbows, q_ddot, current_dot, elbow
 
 @template(entry=True)
 def project_poses(q, parameters, elbows):
-    """Moves poses q (B, n) onto the elbows' plane in place, as far as Newton's method gets.
+    """Moves poses q [rad], (B, n), onto the elbows' plane in place, as far as Newton's method gets.
 
     Reads: Q.
     Writes: Q, LENGTH.

@@ -17,7 +17,7 @@ from elbow_gym.kernel.template import template
 
 @template(flat=True)
 def evaluate(ws, shared, n, elbows):
-    """All that the joint accelerations are made of, at the current stage's state."""
+    """Positions, inertias, biases and elbow forces at a stage's state, from which the joint accelerations follow."""
     outward(ws, n)
     inward(ws, n)
     elbow_forces(ws, shared, n, elbows)

@@ -82,7 +82,7 @@ def projection_step(ws, shared, elbows):
 def project(ws, shared, elbows):
     """Newton steps of pose and rates onto the elbows' plane, least change of absolute pitch.
 
-    Mostly one: the drift is the integrator's local error, whose square is below rounding. Near a segment that stands
+    Mostly one step: the drift is the integrator's local error, whose square is below rounding. Near a segment that is
     upright it takes more. A lane stops by its own shift, so its bits do not depend on its neighbours'.
 
     Reads: ACTIVE.

@@ -4,7 +4,7 @@
 STATE = ("q", "q_dot", "current", "electrical_energy", "drawn_energy", "copper_loss", "friction_loss", "link_work")
 STATE_ROWS = len(STATE)
 # Behind them, in arrays for a kernel with a switch on: per joint or, for contacts, per contact point at the link's end;
-# the supply's loss stands with joint 1.
+# the supply's loss is stored with joint 1.
 SWITCHED_STATE = (
     "contact_loss", "temperature_rise", "supply_loss", "contact_radial", "contact_tangential", "contact_normal",
 )  # fmt: skip
@@ -23,7 +23,7 @@ PARAMETERS = (
     "inverse_inductance",  # 1 / L
     "gravity",  # g, the same in every entry
     "payload",  # mass at the hand, the same in every entry
-    # From here on only kernels with a switch on look.
+    # The rows below are read by kernels with a switch on alone.
     "stiffness",  # k of the table
     "dissipation",  # c
     "table_friction",  # mu

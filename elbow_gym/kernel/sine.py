@@ -1,4 +1,4 @@
-"""Sine and cosine of our own: no branch, no library call, the same bits on every lane count and processor."""
+"""Sine and cosine without branches or library calls: the same bits for every lane count and processor."""
 
 # pyright: basic
 

@@ -191,7 +191,7 @@ def offsets(
         rubbing: with friction on rigid elbows.
         drive: with gear friction, warm windings and a supply that sags.
         exponential: with exact decay of the currents.
-        reuse: False gives each quantity of `REUSED` a row of its own, which a test compares with.
+        reuse: False gives each quantity of `REUSED` a separate row, which a test compares with.
     """
     known: dict[str, Any] = {
         name: U(int(value) * lanes // W) for name, value in globals().items() if type(value) is np.uint64

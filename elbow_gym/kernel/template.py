@@ -18,11 +18,11 @@ class Template(NamedTuple):
 
     function: Any
     inlined: bool
-    """Into every caller, by the compiler's back end."""
+    """Whether the compiler's back end writes it into every caller."""
     flat: bool
-    """Written into every caller before it is compiled: nested functions would be optimised once a level."""
+    """Whether it is written into its caller before that is compiled: nested ones would be optimised once a level."""
     entry: bool
-    """Called from Python, and cached on disk with all that it calls."""
+    """Whether Python calls it; it is then cached on disk with all that it calls."""
 
 
 TEMPLATES: dict[str, Template] = {}
@@ -56,7 +56,7 @@ def compiled(function: Any, *, cached: bool = False, inlined: bool = False, flat
 
 
 def compiled_entry(function: Any) -> Any:
-    """A function of its own that Python calls, cached on disk under a name with the digest of the sources."""
+    """Compiled copy of a function that Python calls, cached on disk under a name with the digest of the sources."""
     names: dict[str, Any] = function.__globals__
     return compiled(renamed(function, names, f"{function.__name__}_{sources()}"), cached=True)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from importlib.util import find_spec
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -10,6 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Pixels = NDArray[np.uint8]
+
+
+def can_draw() -> bool:
+    """Whether pygame is installed."""
+    return find_spec("pygame") is not None
 
 
 def load_pygame() -> Any:

@@ -12,20 +12,20 @@ from elbow_gym.table import TableParameters, as_table
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
-    """Switches and loads. Raises ValueError naming the argument, the rule and the value."""
+    """Load, table, friction, heat and supply. Raises ValueError naming the argument, the rule and the value."""
 
     payload: float = 0.0
     """Point mass at the hand [kg]."""
     table: bool | TableParameters | Mapping[str, float] | None = None
-    """A compliant table under joints 3..n and the hand: True for the default one, or its fields."""
+    """Compliant table under joints 3..n and the hand: True for the default one, or its fields."""
     elbow_friction: float = 0.0
     """Coulomb's coefficient of rigid elbows on the table, where they push [-]."""
     heat: bool = False
     """Whether windings warm up, and their resistance with them."""
     supply_voltage: float = 24.0
-    """V0 of the common supply [V], from which `supply_resistance` takes."""
+    """Voltage V0 of the common supply without load [V]; `supply_resistance` lowers it."""
     supply_resistance: float = 0.0
-    """R_s inside the supply [ohm]."""
+    """Resistance R_s inside the supply [ohm]."""
     regeneration: bool = True
     """Whether the supply takes current back."""
 
@@ -44,6 +44,15 @@ class Conditions:
         return self.table if isinstance(self.table, TableParameters) else None
 
     def drive(self, arm: ArmParameters) -> bool:
-        """Whether motors or supply go beyond the paper's."""
+        """Whether windings warm up, the supply has a resistance or a gear of the arm has Coulomb friction."""
         rough = bool((arm.of_motors("gear_coulomb_friction") > 0.0).any())
         return self.heat or self.supply_resistance > 0.0 or rough
+
+
+def as_conditions(conditions: object) -> Conditions:
+    """The conditions themselves; the paper's from None. Raises ValueError on anything else."""
+    if conditions is None:
+        return Conditions()
+    if not isinstance(conditions, Conditions):
+        raise ValueError(f"conditions must be a Conditions or None, got {conditions!r}")
+    return conditions

@@ -1,4 +1,4 @@
-"""Arms as the kernel reads them: parameters in rows, and quantities of a batch."""
+"""Rows of an arm's parameters for the kernel, and the quantities that they come from."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from elbow_gym.parameters import (
     cylinder_axial_inertia,
     cylinder_transverse_inertia,
 )
-from elbow_gym.simulation.options import Conditions
+from elbow_gym.simulation.options import Conditions, as_conditions
 from elbow_gym.table import TableParameters
 
 # Less than any V0 I [W] that motors feed back.
@@ -39,7 +39,7 @@ def parameter_rows(
     Args:
         values: the entries of `quantities`, each (..., n).
         gravity: g [m/s^2].
-        conditions: what the arms work under, but for the two that may differ between them:
+        conditions: table, friction, heat and supply; payload and supply voltage are given apart.
         payload: mass at the hand [kg], shape (...).
         supply_voltage: V0 [V], shape (...).
     """
@@ -80,5 +80,5 @@ def parameter_rows(
 
 def parameter_table(arm: ArmParameters, conditions: Conditions | None = None) -> Array:
     """The kernel's parameter rows of one arm, shape (PARAMETER_ROWS, n)."""
-    under = Conditions() if conditions is None else conditions
+    under = as_conditions(conditions)
     return parameter_rows(quantities(arm), arm.gravity, under, under.payload, under.supply_voltage)

@@ -22,7 +22,7 @@ class Readings:
     """The kernel's state and summary arrays under the names and units of their quantities.
 
     Arrays are (B, n), elbow forces (B, p), positions (B, 3); they are read-only views, true until the next step.
-    Contacts stand in the order of joints 3..n and, last, the hand; they and the heat are zero while switched off.
+    Contacts are in the order of joints 3..n and, last, the hand; contacts and heat are zero while switched off.
     """
 
     _state: Array
@@ -129,7 +129,7 @@ class Readings:
 
     @property
     def temperature_rise(self) -> Array:
-        """Of the windings above the ambient [K], (B, n)."""
+        """Temperature of the windings above the ambient [K], (B, n)."""
         return self._switched("temperature_rise")
 
     @property

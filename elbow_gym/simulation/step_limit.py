@@ -48,10 +48,10 @@ GROWTH = (0.6 / SMOOTH, 1.2 / SMOOTH, 1.8 / SMOOTH)
 
 
 class Mechanism(NamedTuple):
-    """What makes a rate, and the multiples that rate times step may reach, by integrator; None where it is exact."""
+    """Cause of a rate, and the largest rate times step [-] by integrator; None where the integrator is exact."""
 
     constants: str
-    """Formula of the parameters behind it."""
+    """Formula of the rate in parameters, for messages."""
     exponential: float | None
     rk4: float | None
     smooth: bool = True

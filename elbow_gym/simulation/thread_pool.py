@@ -13,7 +13,7 @@ import numpy as np
 
 
 class Answer(NamedTuple):
-    """What a share gave."""
+    """Result of a share."""
 
     value: int
     error: BaseException | None = None

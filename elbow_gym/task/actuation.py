@@ -1,4 +1,4 @@
-"""Actions on their way to the motors: from their unit to volts, clipped to the supply and late by a delay."""
+"""Voltages from actions: largest action, volts per unit, and the queue of an action delay."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Actuation:
     Args:
         settings: the environment's arguments.
         population: the arms' parameters.
-        num_envs: B.
+        num_envs: B, the number of arms.
     """
 
     def __init__(self, settings: Settings, population: Population, num_envs: int) -> None:
@@ -32,7 +32,7 @@ class Actuation:
         self.take_values()
 
     def check(self, values: Mapping[str, Array]) -> None:
-        """Raises ValueError when an arm's actions would be later than observations make room for."""
+        """Raises ValueError when an arm's action delay is longer than the observations have entries for."""
         delay = values["action_delay"].max(initial=0.0)
         if delay > self._longest_delay:
             raise ValueError(
@@ -40,17 +40,17 @@ class Actuation:
             )
 
     def reset(self, chosen: NDArray[np.int64]) -> None:
-        """The chosen arms start without voltages on their way."""
+        """Empties the queues of the chosen arms, given by their numbers (k,)."""
         self.queue[chosen] = 0.0
         self.take_values()
 
     def take_values(self) -> None:
-        """Supply voltages and delays are as the arms' values say from now on."""
+        """Takes over the supply voltages [V] and action delays [control periods] of the arms' values."""
         self._supply[:] = self._population.values["supply_voltage"]
         self._late[:] = self._population.values["action_delay"]
 
     def arguments(self) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-        """What the kernel makes volts of actions with: largest action, volts per unit of action, queue and delays.
+        """The kernel's arguments: largest action (B,), volts per unit of action (B,), queue and delays (B,).
 
         The arrays are this object's own and are brought up to date in place.
         """

@@ -1,4 +1,4 @@
-"""The arms of a batch as they differ from each other, and what the kernel reads of them."""
+"""Parameters of the arms of a batch by name, and their rows for the kernel."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Population:
 
     Args:
         arm: the nominal arm.
-        conditions: what all arms work under; its payload and supply voltage are nominal too.
-        randomization: what is drawn.
-        num_envs: B.
+        conditions: load, table, friction, heat and supply; payload and supply voltage are nominal values, too.
+        randomization: ranges that are drawn from.
+        num_envs: B, the number of arms.
     """
 
     def __init__(self, arm: ArmParameters, conditions: Conditions, randomization: Randomization, num_envs: int) -> None:
@@ -37,10 +37,10 @@ class Population:
         self.values: dict[str, Array] = {
             name: np.repeat(self.nominal[name][None], num_envs, axis=0) for name in (*FACTORS, *NUMBERS)
         }
-        """Each (B, n) or (B,), in SI units, under the names of `Randomization`."""
+        """Present values of all arms in SI units, (B, n) or (B,), by the names of `Randomization`."""
 
     def draw(self, generators: Sequence[np.random.Generator], given: Any = None) -> dict[str, Array]:
-        """Values of new arms by name, each (k, n) or (k,): drawn by each its generator, or as `given` says."""
+        """Values of k new arms by name, (k, n) or (k,), each drawn by its arm's generator unless `given` has it."""
         fixed = {} if given is None else self.randomization.given(given, self.nominal)
         drawn = [self.randomization.draw(self.nominal, generator) for generator in generators]
         return {
@@ -49,7 +49,7 @@ class Population:
         }
 
     def put(self, chosen: NDArray[np.int64], values: Mapping[str, Array]) -> Array:
-        """Takes over values of the chosen arms. Returns their rows for the kernel, (k, PARAMETER_ROWS, n)."""
+        """Takes over values of the chosen arms (k,); returns their rows for the kernel, (k, PARAMETER_ROWS, n)."""
         for name, rows in values.items():
             self.values[name][chosen] = rows
         k = len(chosen)
@@ -63,7 +63,7 @@ class Population:
         return any(bool((value != self.nominal[name]).any()) for name, value in self.values.items())
 
     def arms(self, chosen: NDArray[np.int64]) -> list[ArmParameters]:
-        """The chosen arms with their own lengths, for kinematics."""
+        """Parameters of the chosen arms (k,) with their drawn lengths, for kinematics."""
         return [
             replace(
                 self._arm,
@@ -76,5 +76,5 @@ class Population:
         ]
 
     def copy(self) -> dict[str, Array]:
-        """The values of all arms, for a state to come back to."""
+        """A copy of the values of all arms, by name."""
         return {name: value.copy() for name, value in self.values.items()}

@@ -1,4 +1,4 @@
-"""The target: a closed path in space, a circle by default, as a pure function of its angle, and the angle of time."""
+"""Closed path of the target, a circle by default, as a function of its angle, and the angle at a time."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ DIRECTIONS = ("counterclockwise", "clockwise")
 class Circle:
     """The circle, or other closed path, that the hand should follow; the defaults are the paper's.
 
-    The angle grows from the plane's first axis to its second: x to y (counterclockwise seen from +z), x to z,
+    The angle grows from the plane's first axis to its second: x to y (counterclockwise from above), x to z,
     y to z, or, in the radial plane through the z axis and the centre, outward to up.
 
     A quantity given as a range, as several planes or as "random" is drawn anew at each reset (`draw`); until then the
@@ -51,11 +51,11 @@ class Circle:
     period: Range = 5.0
     """Time of one turn [s], or (low, high)."""
     plane: str | tuple[str, ...] = "xy"
-    """"xy", "xz", "yz" or "radial"; some of them to draw one, or "random" for any."""
+    """Plane: "xy", "xz", "yz" or "radial"; several of these to draw from, or "random" for any."""
     phase: float | str = 0.0
     """Angle at time zero [rad], or "random"."""
     direction: str = "counterclockwise"
-    """"counterclockwise", "clockwise" or "random"."""
+    """Sense of rotation: "counterclockwise", "clockwise" or "random"."""
     shape: str | tuple[Point, ...] = "circle"
     """"circle", "figure_eight", or points [m] in world x, y, z, passed at equal steps of the angle in their order.
 
@@ -266,7 +266,7 @@ def _extreme_points(circle: Circle) -> Array:
     Outward the shortfall is convex in the point, and the point affine in the centre (in the radial plane: in its height
     and its distance from the axis, itself convex), so that the worst centre is a corner of its box; the worst radius is
     the largest, because circles and eights are symmetric about their centre. A hole around the base is not convex: the
-    last point stands for it, the nearest one of a box around all circles, which may refuse a set that just misses it.
+    last point represents it, the nearest one of a box around all circles, which may refuse a set that just misses it.
     """
     # No wave of the path goes by with fewer than 45 samples.
     angle = np.linspace(0.0, 2.0 * np.pi, 1 + 45 * max(8, circle.path_rows // 2))

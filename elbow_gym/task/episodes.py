@@ -1,9 +1,8 @@
-"""B episodes side by side: the one engine under the single and the batched environment."""
+"""Episodes of B arms side by side, the engine of both the single and the batched environment."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -31,7 +30,7 @@ INFO_FIGURES = FIGURES[:-1]
 
 
 class Outcome(NamedTuple):
-    """What a control step gives, one entry per arm."""
+    """Result of a control period, one entry per arm."""
 
     observation: NDArray[np.float32]
     reward: Array
@@ -45,24 +44,24 @@ class Episodes:
 
     Args:
         settings: the environment's arguments.
-        num_envs: B.
-        num_threads: see `Simulator`.
+        num_envs: B, the number of arms.
+        num_threads: threads over which blocks of arms are spread; the results do not depend on it.
+        longest: control periods after which an episode is truncated at the latest; no limit but the duration when None.
     """
 
-    def __init__(self, settings: Settings, num_envs: int = 1, num_threads: int = 1) -> None:
+    def __init__(self, settings: Settings, num_envs: int = 1, num_threads: int = 1, longest: int | None = None) -> None:
         self.settings = settings
         self.arm = settings.parsed_arm
         self.circle = settings.parsed_circle
-        """What the targets' circles are drawn from."""
-        conditions = settings.conditions
+        """Path of the targets, or ranges from which each arm's is drawn at its reset."""
         self.simulator = Simulator(
             self.arm,
             settings.elbow_joints,
             num_envs,
+            conditions=settings.conditions,
             timestep=float(settings.substeps.min()),
             integrator=settings.integrator,
             num_threads=num_threads,
-            **{field.name: getattr(conditions, field.name) for field in fields(conditions)},
         )
         self.simulator.period = settings.control_period
         self.num_envs = num_envs
@@ -70,12 +69,15 @@ class Episodes:
         self.energy_weight = float(settings.energy_weight)
         self.pose = self.simulator.on_table(self.arm.nominal_pose)[0]
         """Start pose [rad], (n,): the nominal one, on the elbows' plane. Observed angles count from it."""
-        self.population = Population(self.arm, conditions, settings.randomization, num_envs)
+        self.population = Population(self.arm, settings.conditions, settings.randomization, num_envs)
         self.targets = Targets(self.circle, num_envs, settings.control_period)
         self.actuation = Actuation(settings, self.population, num_envs)
         self.sensing = Sensing(settings, self.simulator, self.population, self.actuation.queue)
         self.layout = self.sensing.layout
-        self._substeps, self._horizon = settings.substeps, settings.horizon
+        self._substeps = settings.substeps
+        self.horizon = settings.horizon if longest is None else min(settings.horizon, longest)
+        """Control periods after which an episode is truncated."""
+        self._arms_differ, self._circles_differ = bool(settings.randomization.ranges), self.circle.random
         if settings.start == "on_target" and not self.circle.random:
             inverse_kinematics(self.arm, self.pose, self.circle.position(np.linspace(0.0, 2.0 * np.pi, 73)))
         self._steps = np.zeros(num_envs, dtype=np.int64)
@@ -98,7 +100,7 @@ class Episodes:
         return float(self.settings.voltage_limit) / self.highest_action
 
     def target(self) -> Array:
-        """The targets' positions now [m], (B, 3)."""
+        """Present position of each target [m], (B, 3)."""
         return self.targets.position(self.angle())
 
     def reset(
@@ -135,11 +137,16 @@ class Episodes:
             self.population.values = before[0]
             self.simulator.set_parameters(chosen, before[1])
             raise
+        self._arms_differ = self._differing()
         self.targets.put(chosen, circles)
         self.actuation.reset(chosen)
         self.sensing.set_noise(chosen, drawing)
         self._steps[chosen] = 0
         self._spent[chosen] = 0.0
+
+    def _differing(self) -> bool:
+        """Whether infos tell the arms' parameters: they are drawn, or some arm was given others than the nominal."""
+        return bool(self.population.randomization.ranges) or self.population.changed
 
     def _draw_arms(self, generators: Sequence[np.random.Generator], chosen: NDArray[np.int64], given: Any) -> None:
         if given is None and not self.population.randomization.ranges and not self.population.changed:
@@ -201,7 +208,7 @@ class Episodes:
             raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
         self.sensing.complete(snapshot.observation, waiting)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
-        truncated = self._steps >= self._horizon
+        truncated = self._steps >= self.horizon
         if invalid:
             terminated = ~self.simulator.valid
             self._charge_the_rest(terminated, snapshot, Price(*price))
@@ -210,7 +217,7 @@ class Episodes:
         return Outcome(snapshot.observation, snapshot.figure("reward"), terminated, truncated, info)
 
     def _charge_the_rest(self, terminated: NDArray[np.bool_], snapshot: Snapshot, price: Price) -> None:
-        """Puts the worst reward for the remaining time, this step included, in place of the terminated arms'."""
+        """Charges terminated arms the worst reward for the remaining time, this control period included."""
         rest = np.maximum(self.settings.horizon - self._steps + 1, 1)[terminated]
         values = self.population.values
         motors = values["supply_voltage"][terminated], values["armature_resistance"][terminated]
@@ -220,7 +227,7 @@ class Episodes:
         snapshot.figure("reward")[terminated] = charge.total
 
     def angle(self) -> Array:
-        """Each target's angle on its circle now [rad], (B,)."""
+        """Present angle of each target on its path [rad], (B,)."""
         return self.targets.angle(self._steps)
 
     def observe(self, resting: NDArray[np.bool_] | None = None) -> Snapshot:
@@ -235,28 +242,31 @@ class Episodes:
         self.sensing.complete(snapshot.observation, resting)
         return snapshot
 
-    def info(self, snapshot: Snapshot, voltage: Array | None = None) -> dict[str, Any]:
-        """Fresh arrays of the step's figures, one row per arm; without a voltage, of a reset: also what was drawn."""
+    def info(self, snapshot: Snapshot, command: Array | None = None) -> dict[str, Any]:
+        """Metrics of a control period and draws in new arrays, one row per arm; after a reset without a command."""
         info: dict[str, Any] = dict(zip(INFO_FIGURES, snapshot.figures, strict=False))
-        info["voltage"] = np.zeros((self.num_envs, self.arm.n_joints)) if voltage is None else voltage
+        if command is None:
+            command = np.zeros((self.num_envs, self.arm.n_joints))
+        info["voltage"] = command.copy() if self.sensing.silent else self.sensing.terminal_voltage(command)
+        info["voltage_command"] = command
         summary = self.simulator.raw[1].copy()
         info["elbow_force"], info["constraint_residual"] = summary[:, SUMMARY_COLUMNS:], summary[:, RESIDUAL]
-        info.update(self.sensing.info())
-        if voltage is None:
-            if self.population.randomization.ranges or self.population.changed:
-                info["parameters"] = self.population.copy()
-            if self.circle.random:
-                info["circle"] = self.targets.figures()
+        if not self.sensing.silent:
+            info.update(self.sensing.info())
+        if self._arms_differ:
+            info["parameters"] = self.population.copy()
+        if self._circles_differ:
+            info["circle"] = self.targets.figures()
         return info
 
     def get_state(self) -> dict[str, Any]:
-        """A copy of everything that runs on but the generators."""
+        """A copy of everything that changes from step to step, except the generators."""
         own = {"steps": self._steps.copy(), "spent": self._spent.copy()}
         parts = {"targets": self.targets.get_state(), "parameters": self.population.copy()}
         return {"simulator": self.simulator.get_state(), **parts, "queue": self.actuation.queue.copy(), **own}
 
     def set_state(self, state: Mapping[str, Any], generators: Sequence[np.random.Generator]) -> None:
-        """Takes a state of `get_state` from episodes of the same settings and size, and each arm's generator."""
+        """Restores a state of `get_state` of the same settings and number of arms; takes each arm's generator."""
         own = {"steps": self._steps, "spent": self._spent, "queue": self.actuation.queue}
         require_entries(state, (*own, "simulator", "targets", "parameters"), "state")
         check_restorable(own, state)
@@ -267,6 +277,7 @@ class Episodes:
         restore(own, state)
         self.actuation.take_values()
         self.sensing.set_noise(everyone, generators)
+        self._arms_differ = self._differing()
 
 
 def given_state(state: object) -> dict[str, Any] | None:

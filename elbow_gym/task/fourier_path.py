@@ -19,7 +19,7 @@ SHAPES = ("circle", "figure_eight")
 
 
 def as_plane(plane: object) -> str | tuple[str, ...]:
-    """A plane's name, "random", or names of planes to draw from. ValueError on anything else."""
+    """A plane's name, "random", or names of planes to draw from. Raises ValueError on anything else."""
     if isinstance(plane, str) and plane in (*PLANES, "random"):
         return plane
     if isinstance(plane, list | tuple) and plane:
@@ -30,7 +30,7 @@ def as_plane(plane: object) -> str | tuple[str, ...]:
 
 
 def as_shape(shape: object) -> str | tuple[Point, ...]:
-    """A shape's name, or the points [m] of a path of one's own, three or more. ValueError on anything else."""
+    """A shape's name, or three or more points of a path [m]. Raises ValueError on anything else."""
     if isinstance(shape, str) and shape in SHAPES:
         return shape
     if not isinstance(shape, list | tuple | np.ndarray):

@@ -14,7 +14,7 @@ from elbow_gym.parameters import Array
 
 OBSERVATION_VERSION = 1
 LOOKAHEAD = 0.1
-"""Time by which the look-ahead error is ahead of the target [s]."""
+"""Time by which the look-ahead target is ahead of the target [s]."""
 
 
 class Feature(NamedTuple):
@@ -23,12 +23,12 @@ class Feature(NamedTuple):
     name: str
     unit: str
     scale: float
-    """An entry of the observation is the quantity divided by this."""
+    """Quantity per unit of an entry, in the quantity's unit."""
     limit: float
-    """The quantity saturates here."""
+    """Largest magnitude of the quantity, at which it saturates, in its unit."""
     meaning: str
     suffixes: tuple[str, ...] = ()
-    """Of the entries' names; joint numbers where there are none."""
+    """Suffixes of the entries' names; joint numbers where there are none."""
 
 
 AXES = ("x", "y", "z")
@@ -43,10 +43,10 @@ FEATURES = (
 )
 SWITCHED_FEATURES = (
     Feature("contact_force", "N", 5.0, 1e4, "the table's normal force, joints 3 to n and the hand"),
-    Feature("temperature_rise", "K", 50.0, 1e4, "of the windings above the ambient"),
+    Feature("temperature_rise", "K", 50.0, 1e4, "temperature of the windings above the ambient"),
     Feature("pending_voltage", "V", 24.0, 1e4, "voltages still on their way, newest first"),
 )
-"""Behind the others, in environments where they are switched on."""
+"""Features behind the others, in environments where they are switched on."""
 
 
 @dataclass(frozen=True)
@@ -55,21 +55,21 @@ class ObservationLayout:
 
     n_joints: int
     switched: Mapping[str, int] = field(default_factory=dict[str, int])
-    """Entries of each switched feature; none where it is missing or zero."""
+    """Number of entries of each switched feature; zero where it is missing."""
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:
-        """The features that the observation has, in their order."""
+        """Features of the observation, in order."""
         return (*FEATURES, *(feature for feature in SWITCHED_FEATURES if self.switched.get(feature.name)))
 
     @cached_property
     def sizes(self) -> tuple[int, ...]:
-        """Entries of each feature."""
+        """Number of entries of each feature."""
         return tuple(self.switched.get(f.name, len(f.suffixes) or self.n_joints) for f in self.features)
 
     @cached_property
     def slices(self) -> dict[str, slice]:
-        """Where each feature stands in the observation."""
+        """Slice of the observation by feature name."""
         ends = np.cumsum(self.sizes)
         return {
             f.name: slice(int(end) - size, int(end))
@@ -83,7 +83,7 @@ class ObservationLayout:
 
     @property
     def size(self) -> int:
-        """Entries of the observation."""
+        """Number of entries of the observation."""
         return sum(self.sizes)
 
     @cached_property

@@ -61,11 +61,11 @@ class Randomization:
         }
 
     def highest(self, name: str) -> float:
-        """The upper end of a range; zero when it is not given."""
+        """Upper end of a range, in the unit of its entry; zero when it is not given."""
         return ends(self.ranges[name])[-1] if name in self.ranges else 0.0
 
     def lowest(self, name: str) -> float:
-        """The lower end of a factor's range; one when it is not given."""
+        """Lower end of a factor's range [-]; one when it is not given."""
         return ends(self.ranges[name])[0] if name in self.ranges else 1.0
 
     def draw(self, nominal: Mapping[str, Array], generator: np.random.Generator) -> dict[str, Array]:
@@ -87,7 +87,7 @@ class Randomization:
 
     @staticmethod
     def given(values: Any, nominal: Mapping[str, Array]) -> dict[str, Array]:
-        """Values from a reset option, in SI units, (n,) or a number for all. ValueError naming a wrong one."""
+        """Values from a reset option, in SI units, (n,) or a number for all. Raises ValueError naming a wrong one."""
         if not isinstance(values, Mapping):
             raise ValueError(f"options['parameters'] must be a dict of values, got {values!r}")
         plain = cast("Mapping[str, Any]", values)

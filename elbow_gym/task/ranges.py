@@ -16,7 +16,7 @@ def is_pair(value: object) -> bool:
 
 
 def as_range(name: str, value: Any, check: Callable[[str, object], float]) -> Range:
-    """A number, or (low, high), each end as `check(name, end)` returns it. ValueError naming `name` otherwise."""
+    """A number, or (low, high), each end as `check(name, end)` returns it. Raises ValueError naming `name`."""
     if not is_pair(value):
         return check(name, value)
     low, high = (check(name, end) for end in value)

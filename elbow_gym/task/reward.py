@@ -13,16 +13,16 @@ from elbow_gym.task.observation import ObservationLayout
 
 
 class Price(NamedTuple):
-    """What the reward charges."""
+    """Prices in the reward."""
 
     tracking_weight: float
-    """Per metre of tracking error at the end of a control step [1/m]."""
+    """Cost per metre of tracking error at the end of a control period [1/m]."""
     energy_weight: float
-    """Per watt of mean electrical power over it [1/W]."""
+    """Cost per watt of mean electrical power over a control period [1/W]."""
     control_frequency: float
-    """Control steps per second [Hz]."""
+    """Control periods per second [Hz]."""
     regeneration: bool
-    """Whether negative power is credited."""
+    """Whether negative electrical power is credited."""
 
 
 class Charge(NamedTuple):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from elbow_gym.kernel.rows import FIGURES
+from elbow_gym.motors import terminal_voltage
 from elbow_gym.parameters import Array
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.arm_batch import Population
@@ -30,17 +31,17 @@ class Snapshot(NamedTuple):
 
 
 def blank(num_envs: int, size: int) -> Snapshot:
-    """A snapshot of B arms that the kernel is to fill."""
+    """An empty snapshot of B arms for observations of `size` entries, which the kernel fills."""
     return Snapshot(np.empty((num_envs, size), np.float32), np.empty((len(FIGURES), num_envs)))
 
 
 class Sensing:
-    """What switched-on features add to the observations and infos of B arms, and the sensors' noise.
+    """Entries of the switched-on features in observations and infos of B arms, and the sensors' noise.
 
     Args:
         settings: the environment's arguments.
-        simulator: the arms.
-        population: their parameters.
+        simulator: simulator of the arms.
+        population: parameters of the arms.
         queue: voltages asked for, newest first [V], (B, 1 + longest delay, n).
     """
 
@@ -55,12 +56,16 @@ class Sensing:
             "temperature_rise": n if settings.heat else 0,
             "pending_voltage": n * (queue.shape[1] - 1),
         }
+        self.silent = not (
+            settings.heat or settings.conditions.surface or settings.elbow_friction or settings.supply_resistance
+        )
+        """Whether infos hold nothing of switched-on features, and the motors get the voltages that are asked for."""
         self._switched = [name for name, size in sizes.items() if size]
         self.layout = ObservationLayout(n, sizes)
         """The observation's entries, those of the switched-on features included."""
 
     def set_noise(self, chosen: NDArray[np.int64], generators: Sequence[np.random.Generator]) -> None:
-        """The chosen arms' noise comes from these generators and is as strong as their values say from now on."""
+        """Sets the chosen arms' generators of noise, and its standard deviations from the arms' values."""
         if not self._generators:
             self._generators = [np.random.default_rng(0)] * self._simulator.num_envs
         for i, generator in zip(chosen, generators, strict=True):
@@ -89,8 +94,16 @@ class Sensing:
             return self._simulator.contact_force[..., 2]
         return self._simulator.temperature_rise if name == "temperature_rise" else self._queue[:, :-1]
 
+    def terminal_voltage(self, command: Array) -> Array:
+        """A fresh array of the voltages at the motors' terminals now [V], (B, n), under a command [V], (B, n)."""
+        settings = self._settings
+        if settings.supply_resistance == 0.0:
+            return command.copy()
+        supply = self._population.values["supply_voltage"], settings.supply_resistance, settings.regeneration
+        return terminal_voltage(command, self._simulator.current, *supply)
+
     def info(self) -> dict[str, Any]:
-        """Fresh arrays of what the switched-on features add, one row per arm."""
+        """Entries of infos from the switched-on features by name, new arrays with one row per arm."""
         simulator, settings = self._simulator, self._settings
         info: dict[str, Any] = {}
         if "contact_force" in self._switched:

@@ -28,26 +28,26 @@ class Settings:
     """Arguments of the environments. Raises ValueError naming the argument, the rule and the value."""
 
     elbows: int | tuple[int, ...] = 2
-    """0, 1, 2 as in the paper (joints (), (4,), (4, 7)), or joint numbers held at z = 0."""
+    """Elbows on the table: 0, 1, 2 as in the paper (joints (), (4,), (4, 7)), or joint numbers held at z = 0."""
     arm: str | ArmParameters | Mapping[str, Any] = "paper"
     """Preset name, an ArmParameters, or its JSON dict."""
     control_frequency: float = 50.0
-    """How often an action is read [Hz]; it is held in between."""
+    """Control periods per second [Hz]; an action is held for one."""
     timestep: float | None = None
     """Longest step of the integrator [s], a whole number of which make a control period; refused where it is too long.
 
     None: steps that grow after the voltage's jump, as long as the fastest rate of what was asked for allows.
     """
     integrator: str = "exponential"
-    """"exponential": Runge-Kutta of order 4 with exact decay of the currents; "rk4": the classical method."""
+    """Runge-Kutta method of order 4: "exponential", with exact decay of the currents, or "rk4", the classical one."""
     duration: float = 5.0
     """Episode length [s]."""
     voltage_limit: float = 24.0
     """Supply voltage of every motor [V]."""
     action_unit: str = "fraction"
-    """"fraction" of the supply voltage in [-1, 1], or "volt"."""
+    """Unit of the actions: "fraction" of the supply voltage, in [-1, 1], or "volt"."""
     start: str = "paper"
-    """"paper": the arm's nominal pose; "on_target": the pose whose hand is on the circle."""
+    """Start pose: "paper", the arm's nominal pose; "on_target", the pose whose hand is on the circle."""
     start_noise: float = 0.02
     """Standard deviation of the start pose [rad], projected onto the elbows' plane."""
     circle: Mapping[str, Any] | Circle | None = None
@@ -67,7 +67,7 @@ class Settings:
     heat: bool = False
     """Whether windings warm up, and their resistance with them."""
     supply_resistance: float = 0.0
-    """Inside the motors' common supply [ohm], whose voltage it makes sag."""
+    """Resistance inside the motors' common supply [ohm], which makes its voltage sag."""
     payload: float = 0.0
     """Mass at the hand [kg]."""
     randomize: Mapping[str, Any] | None = None
@@ -106,7 +106,7 @@ class Settings:
 
     @cached_property
     def conditions(self) -> Conditions:
-        """What the arm works under beyond the paper's model."""
+        """Load, table, friction, heat and supply that the arm works under."""
         return Conditions(
             payload=self.payload,
             table=as_table(self.table),
@@ -119,7 +119,7 @@ class Settings:
 
     @cached_property
     def randomization(self) -> Randomization:
-        """What is drawn at each reset."""
+        """Ranges that each reset draws from."""
         return Randomization(self.randomize)
 
     @cached_property
@@ -157,7 +157,7 @@ class Settings:
 
     @property
     def horizon(self) -> int:
-        """Control periods in an episode."""
+        """Number of control periods in an episode."""
         return round(self.duration * self.control_frequency)
 
     @property

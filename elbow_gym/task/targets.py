@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,9 +18,9 @@ class Targets:
     """One target per arm.
 
     Args:
-        circle: what is drawn from at each reset; the same for all arms unless it is random.
-        num_envs: B.
-        control_period: time between two steps [s].
+        circle: path, or ranges from which one is drawn for each arm at its reset.
+        num_envs: B, the number of arms.
+        control_period: time between two actions [s].
     """
 
     def __init__(self, circle: Circle, num_envs: int, control_period: float) -> None:
@@ -31,13 +31,23 @@ class Targets:
         self._path = np.repeat(first.path[None], num_envs, axis=0)
         self._rate = np.full(num_envs, first.rate)
         self._phase = np.zeros(num_envs)
+        self._radius, self._circle_period = np.empty(num_envs), np.empty(num_envs)
+        self._measure(range(num_envs))
         self._turn, self._lookahead = np.empty(num_envs), np.empty(num_envs)
         self._pace()
         self._alike = not circle.random
 
     def _pace(self) -> None:
-        """What follows from the rates: how far the targets turn in a control period, and to the look-ahead [rad]."""
+        """Updates the targets' turns in a control period, and to the look-ahead target [rad], each (B,)."""
         self._turn[:], self._lookahead[:] = self._rate * self._period, self._rate * LOOKAHEAD
+
+    def _measure(self, chosen: Iterable[int]) -> None:
+        """Radii and periods of the chosen arms' circles, for infos."""
+        for i in chosen:
+            self._radius[i], self._circle_period[i] = (
+                np.asarray(self.circles[i].radius),
+                np.asarray(self.circles[i].period),
+            )
 
     def draw(self, circle: Circle, generators: Sequence[np.random.Generator], phase: object = None) -> list[Circle]:
         """New circles, each by its arm's generator, which start at `phase` [rad] if it is given.
@@ -49,7 +59,7 @@ class Targets:
         return [circle.draw(generator) for generator in generators]
 
     def check(self, circles: Sequence[Circle]) -> None:
-        """ValueError when circles do not fit into the batch: all paths have the same number of rows."""
+        """Raises ValueError unless the circles' paths have as many rows as those of the batch."""
         rows = self._path.shape[1]
         for circle in circles:
             if circle.path_rows != rows:
@@ -61,6 +71,7 @@ class Targets:
             self._alike = self._alike and bool((circle.path == self.circles[0].path).all())
             self.circles[int(i)] = circle
             self._path[i], self._rate[i], self._phase[i] = circle.path, circle.rate, float(circle.phase)
+        self._measure(map(int, chosen))
         self._pace()
 
     def angle(self, steps: NDArray[np.int64]) -> Array:
@@ -68,7 +79,7 @@ class Targets:
         return self._phase + self._turn * steps
 
     def arguments(self, steps: NDArray[np.int64]) -> tuple[Array, Array, Array, NDArray[np.int64], Array]:
-        """What the kernel needs of the targets: paths, phases, turns, `steps` and look-aheads.
+        """The kernel's arguments: paths [m], phases, turns [rad], `steps` and look-aheads [rad], one row per arm.
 
         The arrays are this object's own and are brought up to date in place.
         """
@@ -92,24 +103,25 @@ class Targets:
         return self._rate.copy()
 
     def get_state(self) -> dict[str, Any]:
-        """A copy of everything that runs on."""
+        """A copy of the paths, rates, phases and circles of all arms."""
         own = {"path": self._path, "rate": self._rate, "phase": self._phase}
         return {**{name: array.copy() for name, array in own.items()}, "circles": list(self.circles)}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Takes a state of `get_state`. ValueError when it is of another number of arms or shape of path."""
+        """Restores a state of `get_state`. Raises ValueError on another number of arms or of path rows."""
         own = {"path": self._path, "rate": self._rate, "phase": self._phase}
         restore(own, state)
         self._pace()
         self.circles = list(state["circles"])
+        self._measure(range(len(self.circles)))
         self._alike = bool((self._path == self._path[0]).all())
 
     def figures(self) -> dict[str, Array]:
         """Centre [m] (B, 3), radius [m], period [s], phase [rad] and signed rate [rad/s] of each circle, (B,)."""
         return {
             "center": self._path[:, 0].copy(),
-            "radius": np.array([circle.radius for circle in self.circles], dtype=np.float64),
-            "period": np.array([circle.period for circle in self.circles], dtype=np.float64),
+            "radius": self._radius.copy(),
+            "period": self._circle_period.copy(),
             "phase": self._phase.copy(),
             "rate": self._rate.copy(),
         }

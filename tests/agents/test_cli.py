@@ -101,7 +101,10 @@ def test_help_of_a_command_joins_the_lines_of_an_argument(app, capsys):
         (["add", "--first", "-1"], "--first must be an integer of at least 0, got -1; see program add --help"),
         (["add", "--first", "1", "--count", "0"], "--count must be a positive integer, got 0; see program add --help"),
         (["add", "--first", "1", "--count", "x"], "--count must be a positive integer, got x; see program add --help"),
-        (["add", "--first", "1", "--more", "[]"], "--more must be a JSON object, got []; see program add --help"),
+        (
+            ["add", "--first", "1", "--more", "[]"],
+            "--more must be a JSON object such as '{\"duration\": 10}', got []; see program add --help",
+        ),
         (
             ["add", "--first", "1", "--sign", "times"],
             "invalid choice 'times' for argument '--sign'. Expected one of ('plus', 'minus'); see program add --help",
@@ -213,7 +216,7 @@ def test_signal_that_a_parent_has_set_to_be_ignored_stays_ignored(app):
     ],
 )
 def test_command_lines_for_cards_hold_no_folders_of_a_user(word, shown):
-    assert spelled("python -m agents train", ["ppo", word]) == f"python -m agents train ppo {shown}"
+    assert spelled("agents", "train", ["ppo", word]) == f"python -m agents train ppo {shown}"
 
 
 def test_line_is_plain_on_a_coloured_terminal():

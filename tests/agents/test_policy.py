@@ -10,8 +10,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from gymnasium.wrappers import RescaleAction
 from stable_baselines3 import PPO
-from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
+from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack, VecMonitor, VecNormalize
 
 import agents.pd
 import elbow_gym
@@ -49,6 +50,61 @@ def test_policy_acts_as_the_model_that_it_came_from(model, policy):
     expected, _ = model.predict(observation, deterministic=True)
     np.testing.assert_allclose(policy.predict(observation)[0], expected, atol=1e-6)
     np.testing.assert_allclose(policy.predict(observation[0])[0], expected[0], atol=1e-6)
+
+
+def trained(wrapped):
+    """A model whose environment has been played in, so that a normaliser of observations has statistics."""
+    kwargs = {"net_arch": [8, 8], "activation_fn": torch.nn.Tanh}
+    model = PPO("MlpPolicy", wrapped, n_steps=50, batch_size=100, policy_kwargs=kwargs, seed=0, device="cpu")
+    return model.learn(100)
+
+
+def plain_arms():
+    return SB3VecEnv(ElbowArmVectorEnv(2, circle={"phase": "random"}, autoreset_mode="SameStep"))
+
+
+def test_policy_of_a_model_behind_vec_normalize_takes_plain_observations():
+    normaliser = VecNormalize(VecMonitor(plain_arms()))
+    model = trained(normaliser)
+    policy = policy_of(model, Settings(), command="test")
+    normaliser.training = False
+    observation = normaliser.reset()
+    for _ in range(20):
+        plain = normaliser.get_original_obs()
+        assert np.abs(observation).max() < normaliser.clip_obs
+        expected, _ = model.predict(observation, deterministic=True)
+        np.testing.assert_allclose(policy.predict(plain)[0], expected, atol=2e-5)
+        observation, *_ = normaliser.step(expected)
+    assert np.abs(observation - normaliser.get_original_obs()).max() > 0.5
+
+
+def test_policy_of_a_model_with_normalised_rewards_alone_is_the_models():
+    model = trained(VecNormalize(plain_arms(), norm_obs=False))
+    observation = model.get_env().reset()
+    expected, _ = model.predict(observation, deterministic=True)
+    policy = policy_of(model, Settings(), command="test")
+    np.testing.assert_allclose(policy.predict(observation)[0], expected, atol=1e-6)
+
+
+def test_policy_of_a_model_whose_observations_never_varied_is_refused():
+    model = trained(VecNormalize(plain_arms()))
+    model.get_vec_normalize_env().obs_rms.var[3] = 0.0
+    with pytest.raises(ValueError, match=r"must have varied in training, got constant \['joint_angle_4 \[rad\]'\]$"):
+        policy_of(model, Settings(), command="test")
+
+
+@pytest.mark.parametrize(
+    ("wrapped", "name"),
+    [
+        (lambda: VecFrameStack(plain_arms(), 2), "VecFrameStack"),
+        (lambda: DummyVecEnv([lambda: RescaleAction(ElbowArmEnv(), np.float32(-2), np.float32(2))]), "ActionWrapper"),
+    ],
+)
+def test_policy_of_a_model_behind_other_wrappers_is_refused_by_name(wrapped, name):
+    env = wrapped()
+    model = PPO("MlpPolicy", env, n_steps=4, batch_size=4, policy_kwargs={"net_arch": [8]}, device="cpu")
+    with pytest.raises(ValueError, match=f"^model must be trained on the environment's own .*, got {name}$"):
+        policy_of(model, Settings(), command="test")
 
 
 @pytest.mark.parametrize(
@@ -280,6 +336,12 @@ def test_bundle_that_does_not_fit_is_refused(policy, tmp_path):
         replace(policy.card, format=7)
     with pytest.raises(ValueError, match=r"weights must be those of 3 layers, got 'weight_9', too"):
         Policy(policy.card, {**policy.weights, "weight_9": policy.weights["weight_0"]})
+    needed = (
+        r"^elbows or env must be given for the baselines 'ppo', such as elbows=0 or elbows=1 or elbows=2, got neither$"
+    )
+    for load in (load_policy, elbow_gym.load_policy):
+        with pytest.raises(ValueError, match=needed):
+            load("ppo")
     with pytest.raises(ValueError, match=r"policy must be one of .*got no"):
         load_policy(tmp_path / "nothing")
     save_policy(policy, tmp_path / "p")

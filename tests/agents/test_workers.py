@@ -6,6 +6,7 @@ import sys
 import time
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 
 import pytest
 
@@ -48,6 +49,20 @@ def test_one_line_says_how_long_it_takes_and_other_messages_stay(made, monkeypat
     expected = f"Compiling the kernel for this machine, once: about {2 * workers.COMPILE_SECONDS} s of CPU time."
     assert lines.count(expected) == 1
     assert sorted(lines) == sorted([expected, *["a warning of another kind"] * 2])
+
+
+def test_further_kernels_are_compiled_and_counted_in_the_same_line(made, monkeypatch, capsys):
+    monkeypatch.setattr(workers, "PATIENCE", 0.01)
+    called = []
+
+    def compile_one(number):
+        called.append(number)
+        time.sleep(0.05)
+
+    compile_before([Settings()], [partial(compile_one, number) for number in (1, 2)])
+    assert (len(made), called) == (1, [1, 2])
+    lines = [line for line in capsys.readouterr().err.splitlines() if "ompil" in line]
+    assert lines == [f"Compiling the kernel for this machine, once: about {3 * workers.COMPILE_SECONDS} s of CPU time."]
 
 
 def test_nothing_is_said_of_kernels_that_are_there(made, capsys):

@@ -175,6 +175,7 @@ def test_an_elastic_smooth_table_gives_back_all_it_took():
     assert not run[:, 10].any()
 
 
+@pytest.mark.slow
 @given(cases(largest=8), between(0.0, 0.3))
 def test_rubbing_elbows_stay_on_their_plane_and_only_brake(case, friction):
     arm, q, q_dot, current, voltage, elbows = case

@@ -6,6 +6,8 @@ import itertools
 import json
 import math
 import pickle
+import subprocess
+import sys
 from fractions import Fraction
 
 import cloudpickle
@@ -245,6 +247,32 @@ def test_weights_can_be_set_from_the_next_step_on():
 def test_step_before_reset_needs_a_reset():
     with pytest.raises(gym.error.ResetNeeded, match=r"^reset must be called before step$"):
         ElbowArmEnv().step(ACTIONS[0])
+
+
+def test_numbers_of_infos_are_numpys_floats_and_pythons_too():
+    env = started()
+    for info in (env.reset()[1], env.step(ACTIONS[0])[4]):
+        numbers = {name: value for name, value in info.items() if np.ndim(value) == 0}
+        assert len(numbers) == 9
+        assert all(type(value) is np.float64 and isinstance(value, float) for value in numbers.values())
+
+
+@pytest.mark.slow
+def test_gymnasiums_checker_passes_without_pygame():
+    code = (
+        "import sys; sys.modules['pygame'] = None\n"
+        "import warnings; warnings.simplefilter('error')\n"
+        "import gymnasium as gym, elbow_gym\n"
+        "from gymnasium.utils.env_checker import check_env\n"
+        "env = gym.make('ElbowArm-v0')\n"
+        "check_env(env.unwrapped)\n"
+        "assert env.metadata['render_modes'] == []\n"
+        "env = elbow_gym.ElbowArmEnv(render_mode='rgb_array'); env.reset()\n"
+        "try: env.render()\n"
+        "except gym.error.DependencyNotInstalled as error: print(error)\n"
+    )
+    said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert said == 'pygame-ce is not installed, run `pip install "elbow-gym[render]"`\n'
 
 
 def test_unknown_render_mode_is_a_value_error():

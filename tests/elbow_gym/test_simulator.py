@@ -206,6 +206,7 @@ LONG_ARM = ArmParameters(
         ({"timestep": 0.006}, r"timestep must be at most 0\.0055 s, for the rate 'friction' .*, got 0\.006"),
         ({"timestep": 0.003, "integrator": "rk4"}, r"timestep must be at most 0\.00216 s, for the rate 'armature' .*"),
         ({"integrator": "euler"}, r"integrator must be one of \('exponential', 'rk4'\), got 'euler'"),
+        ({"conditions": {"heat": True}}, r"conditions must be a Conditions or None, got \{'heat': True\}"),
         ({"elbows": (2,)}, r"elbows must be joints 3 to 10 .*, got 2"),
         ({"arm": LONG_ARM, "elbows": tuple(range(3, 12))}, "elbows must be at most 8, got 9"),
         ({"arm": "puma"}, "arm must be one of .*, got 'puma'"),

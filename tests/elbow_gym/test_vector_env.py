@@ -180,6 +180,65 @@ def test_disabled_refuses_arms_that_are_over_until_they_are_reset():
     assert not env.step(action)[3].any()
 
 
+@pytest.mark.parametrize("kind", [int, np.int64, np.uint8])
+def test_seeds_may_be_numpys_integers(kind):
+    env = ElbowArmVectorEnv(2, **RANDOM)
+    expected, _ = env.reset(seed=3)
+    for seed in (kind(3), [kind(3), kind(4)], np.array([3, 4], dtype=kind)):
+        np.testing.assert_array_equal(env.reset(seed=seed)[0], expected)
+        assert env.np_random_seed == (3, 4)
+    np.testing.assert_array_equal(ElbowArmEnv(**RANDOM).reset(seed=kind(3))[0], expected[0])
+
+
+def test_attributes_and_calls_are_those_of_gymnasiums_own_vector():
+    ours = gym.make_vec("elbow_gym:ElbowArm-v0", 2, render_mode="rgb_array", **RANDOM)
+    theirs = gym.make_vec("ElbowArm-v0", 2, vectorization_mode="sync", render_mode="rgb_array", **RANDOM)
+    for env in (ours, theirs):
+        env.reset(seed=5)
+    for name in ("action_space", "observation_space", "render_mode", "observation_names", "energy_weight", "duration"):
+        assert ours.get_attr(name) == theirs.get_attr(name)
+    assert same(ours.call("render"), theirs.call("render"))
+    assert ours.call("set_energy_weight", 0.5) == theirs.call("set_energy_weight", 0.5)
+    for weights in (0.5, [0.25, 0.25], (0.0, 0.0)):
+        for env in (ours, theirs):
+            env.set_attr("energy_weight", weights)
+        assert ours.get_attr("energy_weight") == theirs.get_attr("energy_weight")
+        assert same(ours.step(actions(2, 1)[0])[1], theirs.step(actions(2, 1)[0])[1])
+    assert [one.bit_generator.state for one in ours.get_attr("np_random")] == [
+        one.bit_generator.state for one in theirs.get_attr("np_random")
+    ]
+    for wrong in ([0.1, 0.2], [0.1]):
+        with pytest.raises(ValueError, match=r"^energy_weight must be the same for all 2 arms of a batch, got \[0.1"):
+            ours.set_attr("energy_weight", wrong)
+    for name in ("reset", "step", "get_state"):
+        with pytest.raises(ValueError, match=f"^{name} must be called on the batch itself"):
+            ours.call(name)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("drawn", [{"randomize": {"mass": [0.9, 1.1], "payload": [0.0, 0.1]}}, {}])
+def test_what_was_drawn_is_in_the_infos_of_resets_and_steps_as_in_gymnasiums_own_vector(mode, drawn):
+    settings = {**RANDOM, "circle": {"radius": [0.05, 0.1], "period": [4.0, 6.0], "phase": "random"}, **drawn}
+    make = functools.partial(gym.make_vec, "elbow_gym:ElbowArm-v0", num_envs=3, **settings)
+    ours = play(make(autoreset_mode=mode), 2 * HORIZON)
+    theirs = play(make(vectorization_mode="sync", vector_kwargs={"autoreset_mode": mode}), 2 * HORIZON)
+    keys = {key for key in ours[0][-1] if not key.startswith("_")}
+    assert {"circle", *(["parameters"] if drawn else [])} <= keys
+    for answer, expected in zip(ours, theirs, strict=True):
+        agree(answer[-1], expected[-1])
+        assert {key for key in answer[-1] if not key.startswith("_")} - {"final_obs", "final_info"} == keys
+
+
+def test_parameters_given_to_one_episode_are_in_its_infos_alone():
+    env = ElbowArmVectorEnv(2, autoreset_mode="SameStep", duration=0.04)
+    env.reset(seed=0, options={"parameters": {"payload": 0.2}})
+    np.testing.assert_array_equal(env.step(actions(2, 1)[0])[4]["parameters"]["payload"], 0.2)
+    *_, last = env.step(actions(2, 1)[0])
+    np.testing.assert_array_equal(last["final_info"]["parameters"]["payload"], 0.2)
+    assert "parameters" not in last
+    assert "parameters" not in env.step(actions(2, 1)[0])[4]
+
+
 def test_seed_of_arm_i_is_the_integer_plus_i_or_the_lists_entry():
     env = ElbowArmVectorEnv(3, **RANDOM)
     by_integer, _ = env.reset(seed=5)
@@ -197,6 +256,8 @@ def test_seed_of_arm_i_is_the_integer_plus_i_or_the_lists_entry():
     [
         ("reset", {"seed": [1, 2]}, r"seed must be an integer or one per arm \(3\), got 2"),
         ("reset", {"seed": [8, -1, 8]}, "Seed must be "),
+        ("reset", {"seed": 1.5}, r"seed must be an integer or one per arm \(3\), got 1.5"),
+        ("reset", {"seed": [8, 1.5, 8]}, r"seed must be an integer or one per arm \(3\), got \[8, 1.5, 8\]"),
         ("reset", {"options": {"reset_mask": np.array([1, 0, 1])}}, r"options\['reset_mask'\] must be a bool array"),
         ("reset", {"options": {"reset_mask": np.array([True])}}, r"options\['reset_mask'\] must be .* \(3,\), got "),
         ("reset", {"options": {"reset_mask": np.zeros(3, bool)}}, r"options\['reset_mask'\] must choose at least"),
@@ -238,14 +299,21 @@ def test_arm_that_was_never_reset_does_not_step(mode):
         env.step(actions(2, 1)[0])
 
 
-@pytest.mark.parametrize("mode", RESETTING)
-def test_gymnasiums_episode_statistics_count_returns_and_lengths(mode):
+@pytest.mark.parametrize("mode", MODES)
+def test_gymnasiums_episode_statistics_count_returns_and_lengths_of_every_episode(mode):
+    if mode is AutoresetMode.SAME_STEP and tuple(map(int, gym.__version__.split(".")[:2])) < (1, 4):
+        pytest.skip("Gymnasium before 1.4 counts episodes in SameStep as if they were reset in the next step")
     env = RecordEpisodeStatistics(ElbowArmVectorEnv(2, autoreset_mode=mode, **RANDOM))
     env.reset(seed=0)
-    answers = [env.step(action) for action in actions(2, HORIZON)]
-    episode = answers[-1][4]["episode"]
-    np.testing.assert_allclose(episode["r"], sum(answer[1] for answer in answers), rtol=1e-12)
-    np.testing.assert_array_equal(episode["l"], HORIZON)
+    for _ in range(3):
+        answers = [env.step(action) for action in actions(2, HORIZON)]
+        episode = answers[-1][4]["episode"]
+        np.testing.assert_allclose(episode["r"], sum(answer[1] for answer in answers), rtol=1e-12)
+        np.testing.assert_array_equal(episode["l"], HORIZON)
+        if mode is AutoresetMode.NEXT_STEP:
+            assert not env.step(actions(2, 1)[0])[1].any()
+        if mode is AutoresetMode.DISABLED:
+            env.reset(options={"reset_mask": np.ones(2, dtype=np.bool_)})
 
 
 @pytest.mark.parametrize(

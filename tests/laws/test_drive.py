@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from elbow_gym import MotorParameters, Simulator, kinematics, motors, paper_arm
-from elbow_gym.simulation.options import Conditions
+from elbow_gym import Conditions, MotorParameters, Simulator, kinematics, motors, paper_arm
 from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.simulation.step_limit import limits, rates
 from tests.support.kernel_calls import uncompiled
@@ -19,8 +18,8 @@ STALLED = MotorParameters(rotor_inertia=1e12, torque_constant=1e-200)
 
 def stalled(motor=STALLED, timestep=5e-4, **conditions):
     """An arm that leans on its elbows; its motors stand still all the same, and no kernel is compiled for it alone."""
-    leaning = {"table": True, "elbow_friction": 0.1}
-    return Simulator(replace(paper_arm(), motors=(motor,) * 10), 2, timestep=timestep, **leaning, **conditions)
+    leaning = Conditions(table=True, elbow_friction=0.1, **conditions)
+    return Simulator(replace(paper_arm(), motors=(motor,) * 10), 2, conditions=leaning, timestep=timestep)
 
 
 @pytest.fixture
@@ -129,18 +128,18 @@ def test_a_gears_coulomb_friction_holds_against_less_and_yields_to_more(share):
 
 
 @pytest.mark.parametrize(
-    ("motor", "conditions", "message"),
+    ("motor", "conditions", "integrator", "message"),
     [
-        ({"gear_coulomb_friction": 0.05}, {}, "at most 0.000905 s, for the rate 'friction'"),
+        ({"gear_coulomb_friction": 0.05}, {}, "exponential", "at most 0.000905 s, for the rate 'friction'"),
         # R / L = 2200 / s, which only the classical method has to resolve.
-        ({"armature_inductance": 0.0005}, {"integrator": "rk4"}, "at most 0.000636 s, for the rate 'armature' of 2200"),
-        ({"armature_inductance": 0.0005}, {"table": True}, "at most 0.000784 s, for the rate 'table'"),
+        ({"armature_inductance": 0.0005}, {}, "rk4", "at most 0.000636 s, for the rate 'armature' of 2200"),
+        ({"armature_inductance": 0.0005}, {"table": True}, "exponential", "at most 0.000784 s, for the rate 'table'"),
     ],
 )
-def test_a_step_too_long_for_what_is_fastest_is_refused(motor, conditions, message):
+def test_a_step_too_long_for_what_is_fastest_is_refused(motor, conditions, integrator, message):
     arm = replace(paper_arm(), motors=(MotorParameters(**motor),) * 10)
     with pytest.raises(ValueError, match=rf"^timestep must be {re.escape(message)} .*, got 0\.002$"):
-        Simulator(arm, 0, timestep=0.002, **conditions)
+        Simulator(arm, 0, conditions=Conditions(**conditions), timestep=0.002, integrator=integrator)
 
 
 @pytest.mark.usefixtures("python_kernels")
@@ -153,12 +152,13 @@ def test_a_rough_gear_at_the_longest_step_that_is_allowed_comes_to_rest():
     assert np.abs(sim.q_dot).max() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("python_kernels")
 @pytest.mark.parametrize("elbows", [1, 2])
 def test_an_arm_slides_less_far_on_rubbing_elbows(elbows):
     ways = []
     for friction in (0.0, 0.1, 0.3):
-        sim = Simulator("paper", elbows, timestep=5e-4, elbow_friction=friction)
+        sim = Simulator("paper", elbows, conditions=Conditions(elbow_friction=friction), timestep=5e-4)
         sim.reset(q_dot=2.0 * np.eye(10)[0])
         sim.step(np.zeros(10), 400)
         ways.append(sim.q[0, 0])

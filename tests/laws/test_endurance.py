@@ -5,20 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elbow_gym import MotorParameters, Simulator, kinematics, paper_arm
+from elbow_gym import Conditions, MotorParameters, Simulator, kinematics, paper_arm
 
-EVERYTHING = {
-    "table": {"friction": 0.4}, "elbow_friction": 0.3, "heat": True, "supply_resistance": 0.1, "regeneration": False,
-    "payload": 0.2, "timestep": 4e-4,
-}  # fmt: skip
+EVERYTHING = Conditions(
+    table={"friction": 0.4},
+    elbow_friction=0.3,
+    heat=True,
+    supply_resistance=0.1,
+    regeneration=False,
+    payload=0.2,
+)
 
 
 def rough_arm():
     return replace(paper_arm(), motors=(MotorParameters(gear_coulomb_friction=0.02),) * 10)
 
 
-def arms(num_envs, elbows=2, **options):
-    return Simulator(rough_arm(), elbows, num_envs, **{**EVERYTHING, **options})
+def arms(num_envs, num_threads=1):
+    return Simulator(rough_arm(), 2, num_envs, conditions=EVERYTHING, timestep=4e-4, num_threads=num_threads)
 
 
 def poses(sim, num_envs):
@@ -26,9 +30,9 @@ def poses(sim, num_envs):
     return sim.on_table(sim.arm.nominal_pose + 0.05 * noise)
 
 
-def rollout(num_envs, first=0, **options):
+def rollout(num_envs, first=0, num_threads=1):
     """State, forces and meters after a tenth of a second of the arms from `first` on."""
-    sim = arms(num_envs, **options)
+    sim = arms(num_envs, num_threads)
     whole = arms(70)
     rows = slice(first, first + num_envs)
     sim.reset(poses(whole, 70)[rows], temperature_rise=np.full(10, 20.0))

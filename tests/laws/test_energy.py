@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elbow_gym import MotorParameters, Simulator, paper_arm
+from elbow_gym import Conditions, MotorParameters, Simulator, paper_arm
 from tests.support.arms import ELBOWS, inductor_energy, mechanical_energy, started, uneven_arm
 
 
@@ -58,7 +58,7 @@ def test_unpowered_frictionless_arm_conserves_energy():
     arm = replace(paper_arm(), motors=(idle,) * 10, joint_viscous_friction=(0.0,) * 10)
     for elbows in (0, 2):
         # Of a supply that gives next to nothing, such motors do not speed up without end.
-        sim = Simulator(arm, elbows, timestep=2e-4, supply_voltage=1e-12)
+        sim = Simulator(arm, elbows, conditions=Conditions(supply_voltage=1e-12), timestep=2e-4)
         started(sim)
         before, height = mechanical_energy(sim), sim.hand_position[0, 2]
         sim.step(np.zeros(10), 2000)

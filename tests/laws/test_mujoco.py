@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from elbow_gym import Simulator, dynamics, kinematics
+from elbow_gym import Conditions, Simulator, dynamics, kinematics
 from tests.support.mjcf import mjcf
 from tests.support.strategies import cases
 
@@ -38,7 +38,7 @@ def test_an_arm_at_rest_on_the_table_is_borne_as_mujocos(arm):
     # motors' torques, of stalled currents v / R, load some points and relieve others.
     voltage = 0.05 * np.random.default_rng(2).uniform(-1.0, 1.0, 10) * (np.arange(10) > 0)
     flat = np.pi / 2.0 * np.eye(10)[1]
-    sim = Simulator(arm, 0, timestep=5e-4, table=True)
+    sim = Simulator(arm, 0, conditions=Conditions(table=True), timestep=5e-4)
     sim.reset(flat)
     sim.step(voltage, 10_000)
     model = mujoco.MjModel.from_xml_string(mjcf(arm, table=True))

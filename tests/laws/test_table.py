@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from elbow_gym import MotorParameters, Simulator, TableParameters, contact, dynamics, kinematics, paper_arm
+from elbow_gym import (
+    Conditions,
+    MotorParameters,
+    Simulator,
+    TableParameters,
+    contact,
+    dynamics,
+    kinematics,
+    paper_arm,
+)
 from tests.support.arms import inductor_energy, lying, mechanical_energy, small_arm, uneven_arm
 
 ROUGH, SMOOTH = {"friction": 0.3}, {"friction": 0.0}
@@ -53,7 +62,7 @@ def ride(case):
     if "heat" in options:
         rough = tuple(replace(motor, gear_coulomb_friction=0.002) for motor in arm.motors)
         arm = replace(arm, motors=rough)
-    sim = Simulator(arm, elbows, timestep=1e-4, **options)
+    sim = Simulator(arm, elbows, conditions=Conditions(**options), timestep=1e-4)
     rng = np.random.default_rng(4)
     sim.reset(Simulator(uneven_arm(), (4, 7)).on_table(arm.nominal_pose))
     before, fed, forces, losses = stored(sim), 0.0, [], []
@@ -103,7 +112,7 @@ def unpowered(arm, **table):
     idle = MotorParameters(torque_constant=1e-12, gear_viscous_friction=0.0)
     loose = replace(arm, motors=(idle,) * arm.n_joints, joint_viscous_friction=(0.0,) * arm.n_joints)
     # Of a supply that gives next to nothing, such motors do not speed up without end.
-    return Simulator(loose, 0, timestep=2e-5, table=table, supply_voltage=1e-12)
+    return Simulator(loose, 0, conditions=Conditions(table=table, supply_voltage=1e-12), timestep=2e-5)
 
 
 @pytest.mark.parametrize(("dissipation", "friction"), [(0.5, 0.0), (0.0, 0.3), (1.0, 0.3)])
@@ -137,7 +146,8 @@ def test_an_elastic_smooth_table_gives_back_all_it_took():
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_dropped_arm_comes_to_rest_at_the_depth_that_carries_it(friction):
     stiffness = 2e4
-    sim = Simulator(small_arm(), 0, timestep=2e-4, table={"stiffness": stiffness, "friction": friction})
+    table = Conditions(table={"stiffness": stiffness, "friction": friction})
+    sim = Simulator(small_arm(), 0, conditions=table, timestep=2e-4)
     sim.reset(lying(sim.arm, 0.05, 0.03))
     sim.step(np.zeros(3), 20_000)
     # Joint 3 carries half of both links, the hand half of the last one; the base carries the rest.
@@ -147,7 +157,7 @@ def test_a_dropped_arm_comes_to_rest_at_the_depth_that_carries_it(friction):
 
 
 def test_the_papers_arm_lying_flat_rests_on_every_joint_with_a_links_weight():
-    sim = Simulator(paper_arm(), 0, timestep=5e-4, table=True)
+    sim = Simulator(paper_arm(), 0, conditions=Conditions(table=True), timestep=5e-4)
     sim.reset(np.pi / 2.0 * np.eye(10)[1])
     sim.step(np.zeros(10), 10_000)
     # Each joint carries half of the two links that meet there, the hand half of the last one.
@@ -171,7 +181,7 @@ def test_runs_converge_to_the_reference_equations_integrated_elsewhere():
     # Short steps find the instants at which contact begins and ends.
     exact = solve_ivp(rates, (0.0, 0.02), first, method="DOP853", rtol=1e-11, atol=1e-12, max_step=4e-4).y[:, -1]
     for timestep, error in ((1e-3, 3e-4), (1e-4, 3e-5), (1e-5, 2e-6)):
-        sim = Simulator(arm, 0, timestep=timestep, table=table)
+        sim = Simulator(arm, 0, conditions=Conditions(table=table), timestep=timestep)
         sim.reset(start, q_dot)
         sim.step(voltage, round(0.02 / timestep))
         found = np.concatenate([sim.q[0], sim.q_dot[0], sim.current[0]])
@@ -182,7 +192,7 @@ def test_runs_converge_to_the_reference_equations_integrated_elsewhere():
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("elbows", [0, 2])
 def test_the_table_never_pulls_through_seconds_of_full_voltage(elbows, friction):
-    sim = Simulator("paper", elbows, 32, timestep=5e-4, table={"friction": friction})
+    sim = Simulator("paper", elbows, 32, conditions=Conditions(table={"friction": friction}), timestep=5e-4)
     rng, loss, pressed = np.random.default_rng(1), sim.contact_loss.copy(), 0.0
     for k in range(150):
         bang = 24.0 * rng.choice([-1.0, 1.0], (32, 10))
@@ -200,5 +210,5 @@ def test_the_table_never_pulls_through_seconds_of_full_voltage(elbows, friction)
 def test_a_step_too_long_for_the_table_is_refused(table, limit):
     # In proportion to 1 / sqrt(stiffness).
     with pytest.raises(ValueError, match=rf"^timestep must be at most {limit} s, for the rate 'table' .*, got 0.002$"):
-        Simulator("paper", 0, timestep=0.002, table=table)
-    Simulator("paper", 0, timestep=0.99 * limit, table=table)
+        Simulator("paper", 0, conditions=Conditions(table=table), timestep=0.002)
+    Simulator("paper", 0, conditions=Conditions(table=table), timestep=0.99 * limit)

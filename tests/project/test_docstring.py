@@ -107,6 +107,7 @@ def test_every_info_key_is_documented_with_its_unit():
         "drawn_energy": "[J]",
         "link_work": "[J]",
         "voltage": "[V]",
+        "voltage_command": "[V]",
         "elbow_force": "[N]",
         "constraint_residual": "[m/s^2]",
         "below_table": "[s]",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.energy.blocks import BLOCKS, block
+from benchmarks.blocks import BLOCKS, block
 from benchmarks.machine import RESULTS
 
 ROOT = Path(__file__).parents[2]

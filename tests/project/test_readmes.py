@@ -2,14 +2,17 @@
 
 import csv
 import inspect
+import itertools
 import json
 import math
 import re
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import elbow_gym
 from agents.__main__ import app as agents_app
 from agents.learning.presets import default_settings
 from agents.style import CONTROLLER_NAMES
@@ -62,7 +65,7 @@ def test_snippet_of_a_room_runs(page, snippet, tmp_path, monkeypatch):
 
 
 def test_every_room_has_a_snippet_where_it_has_an_interface():
-    assert [PAGES[page].count("```python\n") for page in PAGES] == [1, 12, 2, 0]
+    assert [PAGES[page].count("```python\n") for page in PAGES] == [1, 13, 2, 0]
 
 
 def test_readme_is_short_and_has_the_two_commands():
@@ -128,12 +131,23 @@ def on_table(controller):
 
 
 def batch_step():
-    """Time of an RK4 step in a batch with two elbows on one thread [us], and how much faster than MuJoCo's that is."""
+    """Time of a step in a batch with two elbows on one thread [us], and MuJoCo's RK4 step over it [-]."""
     for row in rows(RESULTS / "speed.csv"):
         key = (row["who"], row["what"], row["unit"], row["joints"], row["elbows"])
-        if key == ("elbow_gym", "batch", "RK4 step", "10", "2"):
+        if key == ("elbow_gym", "batch", "exponential step", "10", "2"):
             return float(row["median [us]"]), float(row["MuJoCo / this"])
     raise AssertionError
+
+
+def at_equal_accuracy():
+    """CPU time of MuJoCo's best integrator over that of the environment's steps, at a state error of 1e-4 [-].
+
+    Of a single arm, and of an arm in a batch.
+    """
+    lines = map(cells, block("benchmarks/README.md", "precision"))
+    ratios = {line[2]: float(line[5]) for line in lines if line[1] == "exponential, growing steps"}
+    single, batch = (ratios[arms] for arms in ("1", "64"))
+    return single, batch
 
 
 # Sentences of the README with a {} for each figure, and the figures as the committed results have them.
@@ -143,6 +157,7 @@ CLAIMS = {
     "it misses by {} mm instead of {} mm": lambda: (missed("energy_shifted.csv"), missed("energy.csv")),
     "once on the circle the PD needs {} J, and PPO {} J": lambda: (on_table(PD), on_table("ppo")),
     "takes {} us on one core, which is {} times faster": batch_step,
+    "an arm is {} times faster than MuJoCo's best integrator, a batch {}.": at_equal_accuracy,
 }
 
 
@@ -207,6 +222,41 @@ def test_infos_of_the_environment_are_documented():
     table = PAGES["elbow_gym/README.md"].split("| info |")[1].split("\n\n")[0]
     named = {name for line in table.splitlines()[2:] for name in re.findall(r"`(\w+)`", cells(line)[0])}
     assert named - {"circle"} == set(env.reset(seed=0)[1])
+
+
+def test_front_of_the_objectives_is_that_of_the_committed_optima():
+    head, _, *lines = block("elbow_gym/README.md", "front")
+    assert cells(head)[:2] == ["elbows", "energy_weight"]
+    optima = {
+        (row["elbows"], row["energy_weight"]): row
+        for row in rows(RESULTS / "optimal.csv")
+        if row["start"] == "paper" and row["under"] == "False"
+    }
+    found = {}
+    for line in lines:
+        elbows, weight, error, power = cells(line)
+        row = optima.pop((elbows, weight))
+        # 250 control periods of 0.02 s.
+        assert float(error) == pytest.approx(-250.0 * float(row["error_mean"]), rel=1e-3)
+        assert float(power) == pytest.approx(-50.0 * float(row["energy"]), rel=1e-4)
+        found.setdefault(elbows, []).append((float(error), float(power)))
+    assert not optima
+    for points in found.values():
+        assert len(points) > 1
+        assert all((a[0] - b[0]) * (a[1] - b[1]) < 0.0 for a, b in itertools.combinations(points, 2))
+
+
+def test_reference_point_of_the_hypervolume_is_worse_than_doing_nothing_and_than_the_pd():
+    quoted = re.search(r"the hypervolume is \((-?\d+), (-?\d+)\)", PAGES["elbow_gym/README.md"]).groups()
+    error, power = map(float, quoted)
+    for elbows in (0, 1, 2):
+        arms = elbow_gym.MOElbowArmVectorEnv(8, elbows=elbows)
+        arms.reset(seed=0)
+        idle = sum(arms.step(np.zeros(arms.action_space.shape))[1] for _ in range(arms.settings.horizon))
+        assert (idle > (error, power)).all()
+        pd = energy()[PD, elbows, "A"]
+        assert -50.0 * float(pd["electrical_energy [J]"]) > power
+        assert -0.25 * float(pd["error_mean [mm]"]) > error
 
 
 def test_training_defaults_are_the_presets():

@@ -114,12 +114,13 @@ class SACSettings(AlgorithmSettings):
         import torch
 
         from agents.learning.sac.inputs import Foresight
+        from elbow_gym.interface import Interface
 
         arguments = self._common(env, seed, log, "qf")
         # Clipped means would need an actor of another kind in the bundles.
         arguments["policy_kwargs"] |= {"log_std_init": self.log_std_init, "clip_mean": 0.0}
-        episodes = env.get_attr("episodes", 0)[0]
-        arguments["policy_kwargs"]["view"] = Foresight(episodes.layout, episodes.arm, episodes.pose)
+        interface = Interface(env.get_attr("unwrapped", 0)[0])
+        arguments["policy_kwargs"]["view"] = Foresight(interface.layout, interface.arm, interface.pose)
         own = ("buffer_size", "batch_size", "train_freq", "gradient_steps", "tau")
         own += ("huber_delta", "actor_rate", "center_tau", "average_tau", "critic_head_start", "proximity")
         model = self.model_class(

@@ -7,13 +7,13 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from agents.control import classical
-from agents.control.classical import COMPUTED, GravityPD, Reference, economical_pose
+from agents.control.classical import COMPUTED, ComputedTorque, GravityPD, Reference, SmoothPD, economical_pose
 from agents.control.minimum_jerk import minimum_jerk
 from agents.control.posture import best_postures, static_copper_loss
 from agents.evaluation.metrics import metrics
 from agents.evaluation.players import CLASSICAL
 from agents.optimal.bound import rollout
-from elbow_gym import Simulator
+from elbow_gym import ElbowArmEnv, Simulator
 from elbow_gym.baselines.pd import CLIPPED
 from elbow_gym.kinematics import hand_position, inverse_kinematics, joint_positions
 from elbow_gym.task.circle import Circle
@@ -116,3 +116,14 @@ def test_the_posture_found_depends_on_no_number_of_threads(arm, elbows):
         with threadpool_limits(threads, user_api="blas"):
             found.append(best_postures(arm, elbows, Circle(), starts=1)[0].pose)
     np.testing.assert_array_equal(*found)
+
+
+@pytest.mark.parametrize("make", [SmoothPD, ComputedTorque])
+def test_single_arm_on_a_drawn_circle_is_played_as_in_a_batch_of_one(make):
+    options = {**COMPUTED, "circle": {"radius": [0.05, 0.15], "period": [4.0, 6.0], "phase": "random"}}
+    env, batch = ElbowArmEnv(elbows=2, **options), ElbowArmVectorEnv(1, elbows=2, **options)
+    controller, batched = make(env), make(batch)
+    observation, rows = env.reset(seed=2)[0], batch.reset(seed=2)[0]
+    for _ in range(20):
+        observation, rows = env.step(controller.predict(observation)[0])[0], batch.step(batched.predict(rows)[0])[0]
+        np.testing.assert_array_equal(observation, rows[0])

@@ -131,8 +131,11 @@ def test_commands_in_clones_cards_clone_with_the_settings_of_the_card(monkeypatc
         ("train ppo --first-seed -1", "--first-seed must be an integer of at least 0, got -1"),
         ("train ppo --workers 0", "--workers must be a positive integer, got 0"),
         ("train ppo --env Foo-v0", "'Foo-v0' for argument '--env'. Expected one of .*ElbowArmTable-v0"),
-        ("train ppo --environment '{'", "--environment must be a JSON object, got {"),
-        ("train ppo --environment 3", "--environment must be a JSON object, got 3"),
+        (
+            "train ppo --environment '{'",
+            "--environment must be a JSON object such as '{\"duration\": 10}', got {, which is no JSON from",
+        ),
+        ("train ppo --environment 3", "--environment must be a JSON object such as '{\"duration\": 10}', got 3"),
         ("train --gamma 0.9 ppo", "--gamma must come after ppo or sac"),
         ("train dpo", "dpo; known: ppo, sac"),
         ("train", "{ppo, sac}"),

@@ -355,6 +355,7 @@ def assert_published(values, elbows):
         assert values["force_smallest"][0] == pytest.approx(-7.9, abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("elbows", [2, 1, 0])
 def test_paper_cases_are_as_published(elbows):
     assert_published(direct(elbows, 1e-4, 1000.0), elbows)

@@ -66,6 +66,7 @@ def test_leaning_on_two_joints_costs_what_is_published(written, friction):
     assert numbers.force_4_largest == 0.0
 
 
+@pytest.mark.slow
 def test_committed_numbers_are_those_of_the_default_table(arm):
     poses, settings = [start_pose(arm, LIFTS["joints 4 and 7"])], settings_of(0, "paper", control_frequency=2000.0)
     [numbers] = measure_on_table(play_on_table(poses, {"friction": 0.3}, settings))

@@ -197,6 +197,7 @@ def test_shifted_set_asks_for_what_the_nominal_one_does_not_have():
     assert shifted.randomization.lowest("payload") > nominal.payload
 
 
+@pytest.mark.slow
 def test_pd_on_drawn_circles_tracks_each_arms_own():
     settings = Settings(**CLIPPED, circle=SHIFTED["circle"], start_noise=0.0, duration=3.0)
     recording = record(settings, PDController, [1, 2, 3], every=100)

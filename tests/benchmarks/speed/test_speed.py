@@ -5,16 +5,17 @@ import json
 import re
 import sys
 import time
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 
-from benchmarks.speed import environments, peers
+from benchmarks.speed import environments, markdown, peers
 from benchmarks.speed import own as contenders
 from benchmarks.speed import run as speed
 from benchmarks.speed.rows import Row, ratios
-from elbow_gym import Simulator
+from elbow_gym import Conditions, Simulator
 from elbow_gym.dynamics import forward_dynamics
 
 
@@ -42,18 +43,28 @@ def test_quick_run_writes_all_own_rows_and_names_missing_peers(tmp_path, capsys,
     # Copies in processes of their own are slow to start, and Gymnasium's business.
     without = [c for c in speed.contenders(quick=True) if "AsyncVectorEnv" not in c.name]
     monkeypatch.setattr(speed, "contenders", lambda quick: without)
-    rows = speed.speed(tmp_path, quick=True)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["speed.csv", "speed.json", "speed.md", "speed.png"]
+    rows = speed.speed(tmp_path, quick=True, command="python -m benchmarks speed --quick")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        *("precision.csv", "precision.md", "precision.png"),
+        *("speed.csv", "speed.json", "speed.md", "speed.png", "speed_brief.md"),
+    ]
     with (tmp_path / "speed.csv").open() as handle:
         written = list(csv.DictReader(handle))
     expected = [c for c in without if c.family in {contenders.OURS, contenders.PAPER, environments.SB3}]
     assert [(r["who"], r["what"], r["unit"]) for r in written] == [(c.family, c.name, c.unit) for c in expected]
-    assert len((tmp_path / "speed.md").read_text().splitlines()) == len(rows) + 2
+    *table, empty, note = (tmp_path / "speed.md").read_text().splitlines()
+    assert len(table) == len(rows) + 2
+    assert not empty
+    assert note.endswith(": equal cost, not equal accuracy.")
     for row in written:
         assert 0.0 < float(row["lower quartile [us]"]) <= float(row["median [us]"]) <= float(row["upper quartile [us]"])
         assert row["MuJoCo / this"] == ""
     context = json.loads((tmp_path / "speed.json").read_text())
     assert set(context["skipped"]) == {"MuJoCo", "Pinocchio", "Gymnasium"}
+    assert context["command"] == "python -m benchmarks speed --quick"
+    assert max(context["precision"]["state and energy error of as many steps of rk4"]) < 1e-10
+    with (tmp_path / "precision.csv").open() as handle:
+        assert {row["who"] for row in csv.DictReader(handle)} == {contenders.OURS}
     assert context["versions"]["numba"]
     assert context["machine"]["processor"]
     assert re.fullmatch(r"((AVX-512|AVX2|AVX|SSE2|NEON), \d doubles)?", context["machine"]["vectors"])
@@ -90,7 +101,7 @@ def test_forty_joints_cost_six_times_ten_at_most():
 def test_the_table_costs_six_tenths_more_at_most(num_envs, elbows):
     samplers = []
     for table in (False, True):
-        sim = Simulator("paper", elbows, num_envs, timestep=1e-3, table=table)
+        sim = Simulator("paper", elbows, num_envs, conditions=Conditions(table=table), timestep=1e-3)
         volts = np.random.default_rng(0).uniform(-12.0, 12.0, (num_envs, 10))
         samplers.append(contenders.timed(partial(sim.step, volts, 20), 20 * num_envs))
     without, with_table = np.min([[sampler(0.02) for sampler in samplers] for _ in range(15)], axis=0)
@@ -180,4 +191,38 @@ def test_a_sample_is_the_time_of_one_unit(monkeypatch):
 
 @pytest.mark.parametrize(("seconds", "text"), [(2.5e-7, "0.25 us"), (1.5e-3, "1.5 ms"), (9.87, "9.87 s")])
 def test_durations_are_written_with_a_fitting_unit(seconds, text):
-    assert speed.duration(seconds) == text
+    assert markdown.duration(seconds) == text
+
+
+def test_every_kernel_that_a_contender_calls_is_compiled_before(monkeypatch):
+    found = []
+    monkeypatch.setattr(contenders, "_step", lambda *case: found.append(case))
+    monkeypatch.setattr(contenders, "_evaluation", lambda *case: found.append(case))
+    for compile_one in contenders.compilations():
+        compile_one()
+    case, batch = contenders.PAPER_CASE, contenders.BATCH
+    steps = {(*case, arms, unit) for arms in (1, batch) for unit in ("RK4 step", "exponential step")}
+    assert set(found) == steps | {(*case, 1), (*case, batch)}
+
+
+def test_a_quick_run_is_not_published():
+    with pytest.raises(ValueError, match="publish must be False for a quick run"):
+        speed.speed(quick=True, publish=True)
+
+
+def test_the_readmes_rows_are_those_of_the_papers_arm_and_mujocos_step_says_what_it_is():
+    rows = [
+        row(peers.MUJOCO, peers.C_LOOP, STEP, 20.0),
+        row(peers.MUJOCO, peers.PYTHON_LOOP, STEP, 20.0),
+        row(OURS, "batch", contenders.EXPONENTIAL_STEP, 0.5),
+        row(OURS, "batch", STEP, 0.5, joints=40),
+        row(environments.SB3, "64x64 net", environments.FRAME, 40.0),
+    ]
+    # Times on the wall are left out.
+    rows.append(replace(rows[2], contender=replace(rows[2].contender, clock="wall")))
+    found = [line.strip("| ").split(" | ") for line in markdown.brief(rows).splitlines()[2:]]
+    assert [(line[0], line[-1]) for line in found] == [
+        ("MuJoCo, C loop; equal cost, not equal accuracy", "1"),
+        ("batch", "40"),
+        ("64x64 net", "-"),
+    ]

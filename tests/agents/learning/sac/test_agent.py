@@ -177,6 +177,7 @@ def test_deterministic_predictions_are_the_average_and_others_the_actor():
     np.testing.assert_allclose(model.predict(observation, deterministic=True)[0], model.predict(observation)[0], 1e-6)
 
 
+@pytest.mark.slow
 def test_proximity_holds_the_actor_to_the_centre():
     def departure(proximity):
         model = small(proximity=proximity, learning_rate=3e-3, center_tau=0.0)

@@ -6,13 +6,15 @@ from pathlib import Path
 
 from agents.files import write_text
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 BLOCKS = {
     "README.md": {"energy": "energy_short.md"},
     "benchmarks/README.md": {
         "energy": "energy_brief.md",
         "breakdown": "breakdown.md",
         "learning": "learning.md",
+        "speed": "speed_brief.md",
+        "precision": "precision.md",
     },
 }
 """Blocks of each README, and the file of the results that each is a copy of."""

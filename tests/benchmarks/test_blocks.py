@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.energy.blocks import BLOCKS, ROOT, block, markers, publish_blocks, replace_block
+from benchmarks.blocks import BLOCKS, ROOT, block, markers, publish_blocks, replace_block
 
 TEXT = "# Title\n\n<!-- energy:begin -->\nold\n<!-- energy:end -->\n\nafter `<!-- other:begin -->`\n"
 

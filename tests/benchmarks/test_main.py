@@ -1,0 +1,14 @@
+"""Commands of the benchmarks: what they hand on of the command line."""
+
+import pytest
+
+from benchmarks.__main__ import app
+
+
+@pytest.mark.parametrize("name", ["energy", "speed"])
+def test_results_record_the_words_that_were_parsed(name, monkeypatch):
+    found = {}
+    monkeypatch.setattr(f"benchmarks.{name}.run.{name}", lambda *_, command: found.update(command=command))
+    monkeypatch.setattr("sys.argv", ["benchmarks", "other", "--words"])
+    app.run([name, "--output", "a b"])
+    assert found == {"command": f"python -m benchmarks {name} --output 'a b'"}
