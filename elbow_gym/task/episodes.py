@@ -169,12 +169,12 @@ class Episodes:
         values = self.population.draw(generators, given)
         self.actuation.check(values)
         rows = self.population.put(chosen, values)
-        self.simulator.set_parameters(chosen, rows)
-        if given is not None:
-            self._check_steps("parameters", chosen)
         if given is not None and "length" in given:
             for arm in self.population.arms(chosen):
                 check_reachable(arm, self.settings.elbow_joints, self.circle)
+        self.simulator.set_parameters(chosen, rows)
+        if given is not None:
+            self._check_steps("parameters", chosen)
 
     def _check_steps(self, option: str, chosen: NDArray[np.int64], start: Start | None = None) -> None:
         """Raises ValueError naming the option unless the steps resolve the chosen arms, put in the states given."""
