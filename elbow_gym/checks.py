@@ -37,6 +37,17 @@ def non_negative(name: str, value: object) -> float:
     return number
 
 
+def friction_coefficient(name: str, value: object) -> float:
+    """The value as a float; ValueError naming `name` unless it is from zero to one.
+
+    Above one, a contact jams or sticks at once in common poses, which no step in use resolves.
+    """
+    number = non_negative(name, value)
+    if number > 1.0:
+        raise ValueError(f"{name} must be at most 1, above which contacts jam in common poses, got {value!r}")
+    return number
+
+
 def positive_integer(name: str, value: object) -> int:
     """The value as an int; ValueError naming `name` unless it is a whole number of at least one."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:

@@ -13,10 +13,12 @@ from elbow_gym.kernel.build import announced, kernel
 from elbow_gym.kernel.rows import (
     LARGEST_ANGLE,
     MAXIMUM_ELBOWS,
+    PERIODS,
     STATE_ROWS,
     SUMMARY_COLUMNS,
     SWITCHED_STATE,
     SWITCHED_STATE_ROWS,
+    TIMESTEPS,
     VALID,
 )
 from elbow_gym.kernel.slots import BLOCK_LANES
@@ -24,8 +26,9 @@ from elbow_gym.kinematics import elbow_heights, pitches
 from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
 from elbow_gym.simulation.options import Conditions, as_conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
+from elbow_gym.simulation.rates import rates
 from elbow_gym.simulation.state_views import Readings
-from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep, rates
+from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep
 from elbow_gym.simulation.thread_pool import Sharing
 
 # A given pose may be off the elbows' plane by this much [m], its rates by this much [m/s].
@@ -140,7 +143,7 @@ class Simulator(Readings):
         valid = self._summary[:, VALID].copy()
         self._summary[chosen] = 0.0
         self._clock[chosen] = 0
-        self._share("refresh", self._state, self._parameters, self._elbow_index, self._summary)
+        self.advance(np.zeros((self.num_envs, self.arm.n_joints)), np.zeros(0))
         # A new summary of the other arms' last state does not make it the outcome of their last step.
         self._summary[~chosen, VALID] = valid[~chosen]
 
@@ -213,7 +216,7 @@ class Simulator(Readings):
         voltage = as_batch("voltage", voltage, (self.num_envs, self.arm.n_joints))
         count = positive_integer("n_substeps", n_substeps)
         self.advance(np.array(voltage, order="C"), np.full(count, self.timestep))
-        self._clock[:, 0] += count
+        self._clock[:, TIMESTEPS] += count
 
     def advance(self, voltage: Array, steps: Array) -> None:
         """Advances every arm through steps of given lengths [s] under constant voltages, without checks or clock.
@@ -222,13 +225,13 @@ class Simulator(Readings):
         """
         self._share("advance", self._state, self._parameters, voltage, self._elbow_index, steps, self._summary)
 
-    def control_step(self, actions: tuple[Any, ...], steps: Array, observed: tuple[Any, ...]) -> int:
+    def control_step(self, actions: tuple[Array, ...], steps: Array, task: tuple[NDArray[Any], ...]) -> int:
         """One control period of every arm, from actions to observations and rewards.
 
         Args:
             actions: the arguments of the kernel's `control_step` before the state.
             steps: lengths of the steps [s].
-            observed: its arguments behind the summary.
+            task: its arguments behind the clock.
 
         Returns:
             The number of arms that are not `valid`; a negative one, with nothing changed, where an action is NaN.
@@ -236,28 +239,21 @@ class Simulator(Readings):
         # One share checks its own actions before it moves; several must not move before all are checked.
         if self._num_threads > 1 and np.isnan(actions[0]).any():
             return -1
-        own = (self._state, self._parameters, self._elbow_index, steps, self._summary)
-        invalid = self._share("control_step", *actions, *own, *observed)
-        if invalid >= 0:
-            self._clock[:, 1] += 1
-        return invalid
+        own = (self._state, self._parameters, self._elbow_index, steps, self._summary, self._clock)
+        return self._share("control_step", *actions, *own, *task)
 
     @property
-    def raw(self) -> tuple[Array, Array]:
-        """The kernel's own state and summary arrays, for functions that only read them."""
-        return self._state, self._summary
+    def raw(self) -> tuple[Array, Array, NDArray[np.int64]]:
+        """The kernel's own state, summary and clock arrays, for functions that only read them."""
+        return self._state, self._summary, self._clock
 
     def _share(self, name: str, *arguments: Any) -> int:
         """Calls an entry of the kernel for every thread's share of the arms; the sum of what they return."""
         entry = getattr(self._kernel, name)
-
-        def work(first: int, end: int) -> int:
-            return entry(*arguments, first, end) or 0
-
         if name in self._called:
-            return self._sharing.total(work)
+            return self._sharing.total(entry, *arguments)
         with announced():
-            total = self._sharing.total(work)
+            total = self._sharing.total(entry, *arguments)
         self._called.add(name)
         return total
 
@@ -272,4 +268,9 @@ class Simulator(Readings):
     @property
     def time(self) -> Array:
         """Time since the reset [s], (B,)."""
-        return self._clock[:, 0] * self.timestep + self._clock[:, 1] * self.period
+        return self._clock[:, TIMESTEPS] * self.timestep + self.periods * self.period
+
+    @property
+    def periods(self) -> NDArray[np.int64]:
+        """Control periods since the reset, (B,)."""
+        return self._clock[:, PERIODS]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, cast
 
-from elbow_gym.checks import check_entries, non_negative, positive
+from elbow_gym.checks import check_entries, friction_coefficient, non_negative, positive
 
 FRICTION_VELOCITY = 0.01
 """Default sliding speed over which friction on the table builds up [m/s]."""
@@ -16,7 +16,8 @@ FRICTION_VELOCITY = 0.01
 class TableParameters:
     """A table at z = 0 that pushes and never pulls: Hunt-Crossley normal force, smooth Coulomb friction.
 
-    Raises ValueError naming the field unless stiffness and friction_velocity are positive, the others not negative.
+    Raises ValueError naming the field unless stiffness and friction_velocity are positive, friction is from zero to one
+    and dissipation is not negative.
     """
 
     stiffness: float = 2e4
@@ -24,13 +25,14 @@ class TableParameters:
     dissipation: float = 0.5
     """Dissipation c [s/m]: share by which the normal force grows per m/s of approach."""
     friction: float = 0.0
-    """Coulomb's coefficient mu [-]."""
+    """Coulomb's coefficient mu [-], at most 1."""
     friction_velocity: float = FRICTION_VELOCITY
     """Sliding speed v_s at which friction has 0.71 of its full size [m/s]."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            check = positive if field.name in {"stiffness", "friction_velocity"} else non_negative
+            checks = {"stiffness": positive, "friction_velocity": positive, "friction": friction_coefficient}
+            check = checks.get(field.name, non_negative)
             object.__setattr__(self, field.name, check(f"table {field.name}", getattr(self, field.name)))
 
     def to_dict(self) -> dict[str, Any]:

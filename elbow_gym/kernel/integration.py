@@ -6,8 +6,11 @@ from elbow_gym.kernel.acceleration import accelerate
 from elbow_gym.kernel.decay import current_coefficients
 from elbow_gym.kernel.elbows import elbow_forces
 from elbow_gym.kernel.projection import project
+from elbow_gym.kernel.rows import FREE_DRIFT
 from elbow_gym.kernel.recursion import inward, outward
-from elbow_gym.kernel.slots import BELOW, DRIVE, EXPONENTIAL, LANES, LOWEST_FREE, LOWEST_Z, STRIDE, U
+from elbow_gym.kernel.slots import (
+    ASTRAY, BELOW, DRIFT, DRIVE, EXPONENTIAL, LANES, LOWEST_FREE, LOWEST_Z, STRIDE, U,
+)  # fmt: skip
 from elbow_gym.kernel.rk4_stages import rk4_first, rk4_fourth, rk4_second, rk4_third
 from elbow_gym.kernel.exponential_stages import (
     exponential_first, exponential_fourth, exponential_second, exponential_third,
@@ -31,8 +34,8 @@ def move(ws, shared, n, elbows, steps):
     k_3, the state moves by h/6 k_1 + h/3 k_2 + h/3 k_3 + h/6 k_4. Each stage adds its share of that sum, then sets the
     state of the next one.
 
-    Reads: LOWEST_Z, BELOW.
-    Writes: BELOW.
+    Reads: LOWEST_Z, BELOW, DRIFT, ASTRAY.
+    Writes: BELOW, ASTRAY.
     """
     tip = U((n - 1) * STRIDE)
     evaluate(ws, shared, n, elbows)
@@ -46,13 +49,15 @@ def move(ws, shared, n, elbows, steps):
         for k in range(LANES):
             shared[BELOW + k] += step if ws[tip + LOWEST_Z + k] < -LOWEST_FREE else 0.0
         for number in range(1, 5):
-            if number > 1:
-                evaluate(ws, shared, n, elbows)
-            accelerate(ws, n, step / 6.0 if number in (1, 4) else step / 3.0)
+            accelerate(ws, n, step / 3.0 if 1 < number < 4 else step / 6.0)
             take_stage(ws, n, step, number)
-        project(ws, shared, elbows)
-        # The summary of the end of this step, and k_1 of the next.
-        evaluate(ws, shared, n, elbows)
+            if number == 4:
+                project(ws, shared, elbows)
+                for k in range(LANES):
+                    left = shared[DRIFT + k] / step
+                    shared[ASTRAY + k] = max(shared[ASTRAY + k], left if left > FREE_DRIFT else 0.0)
+            # After stage 4 this is the summary of the end of the step, and k_1 of the next.
+            evaluate(ws, shared, n, elbows)
 
 
 @template(flat=True)

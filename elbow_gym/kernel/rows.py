@@ -40,8 +40,14 @@ PLAIN_PARAMETER_ROWS = 13
 PARAMETER_ROWS = len(PARAMETERS)
 # Columns of the per-arm summary (B, SUMMARY_COLUMNS + p): hand position, lowest joint or hand height, seconds spent
 # below the table (accumulated), 1 while the state is representable, the largest vertical acceleration that an elbow has
-# in spite of its force [m/s^2], then one force per elbow.
+# in spite of its force, or that steps or friction left it [m/s^2], then one force per elbow.
 HAND, LOWEST, BELOW_TABLE, VALID, RESIDUAL, SUMMARY_COLUMNS = 0, 3, 4, 5, 6, 7
+# Columns of the arms' clock, (B, 2): steps of a timestep, and control periods since the reset.
+TIMESTEPS, PERIODS = 0, 1
+# Columns of what each arm is to do, (B, columns): the largest action, volts per unit of action, delay of actions in
+# control periods, the target's angle at the reset [rad], how far it turns in a control period [rad] and to the
+# look-ahead target [rad], and the energy paid so far [J].
+HIGHEST, VOLTS, DELAY, PHASE, TURN, AHEAD, PAID, TASK_COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7
 # Rows that `observe` fills beside the observation.
 FIGURES = (
     "tracking_error",
@@ -69,6 +75,9 @@ MAXIMUM_ELBOWS = 8
 # Friction of a rigid elbow goes with its force up to this many times the largest force without friction: near a pose in
 # which elbow and friction jam, Coulomb's law has no solution, or one without bound.
 LARGEST_AMPLIFICATION = 10.0
+# Mean vertical acceleration [m/s^2] that a step may leave an elbow with, for the projection to take. The paper's arm
+# has at most 2; with more, near poses in which elbows cannot move against each other, energy is wrong.
+FREE_DRIFT = 100.0
 # A projection onto the table is repeated while it turns a link by more than this [rad per m of it], so often at most.
 SMALL_SHIFT = 1e-7
 NEWTON_STEPS = 30

@@ -38,16 +38,16 @@ def slot(meaning: str) -> np.uint64:
 Q = slot("relative joint angle q [rad]")
 Q_DOT = slot("relative joint velocity [rad/s]")
 CURRENT = slot("armature current i [A]")
-Q0 = slot("q at the start of the step [rad]")
-Q_DOT0 = slot("q_dot at the start of the step [rad/s]")
-CURRENT0 = slot("i at the start of the step [A]")
-Q_DOT_SUM = slot("weighted sum of the stages' q_ddot so far [rad/s]")
-CURRENT_SUM = slot("RK4: weighted sum of the stages' i_dot so far; exponential: i of stage 2 [A]")
 ELECTRICAL = slot("electrical energy, integral of v i [J]")
 DRAWN = slot("drawn energy, integral of max(v i, 0) [J]")
 COPPER = slot("copper loss, integral of R i^2 [J]")
 FRICTION = slot("friction loss of joint and gear [J]")
 WORK = slot("link work, integral of tau q_dot [J]")
+Q0 = slot("q at the start of the step [rad]")
+Q_DOT0 = slot("q_dot at the start of the step [rad/s]")
+CURRENT0 = slot("i at the start of the step [A]")
+Q_DOT_SUM = slot("weighted sum of the stages' q_ddot so far [rad/s]")
+CURRENT_SUM = slot("RK4: weighted sum of the stages' i_dot so far; exponential: i of stage 2 [A]")
 VOLTAGE = slot("terminal voltage v [V]")
 # Parameters, in the order of rows.PARAMETERS.
 LENGTH = slot("link length l [m]")
@@ -166,7 +166,9 @@ FORCES = U(W * _MATRIX)  # elbow forces [N]
 BELOW = U(W * (_MATRIX + MAXIMUM_ELBOWS))  # time below the table [s]
 SHIFT = BELOW + U(W)  # largest shift of a projection step [rad/m]
 ACTIVE = SHIFT + U(W)  # 1 while the projection goes on
-PLAIN_SHARED_ROWS = W * (_MATRIX + MAXIMUM_ELBOWS + 3)
+DRIFT = ACTIVE + U(W)  # largest vertical speed of an elbow after a step, which the projection takes [m/s]
+ASTRAY = DRIFT + U(W)  # largest vertical acceleration of an elbow that its force or its step left [m/s^2]
+PLAIN_SHARED_ROWS = W * (_MATRIX + MAXIMUM_ELBOWS + 5)
 # Where elbows rub: the matrix again, what friction adds to it [1/kg], the free accelerations [m/s^2], friction per
 # newton of each elbow's force, radial and tangential [-], 1 for the elbows that push, and how hard they do [N].
 MATRIX = U(PLAIN_SHARED_ROWS)
@@ -177,7 +179,7 @@ SLIDE_T = SLIDE_R + U(W * MAXIMUM_ELBOWS)
 PUSHING = SLIDE_T + U(W * MAXIMUM_ELBOWS)
 PUSH = PUSHING + U(W * MAXIMUM_ELBOWS)
 PUSH_LIMIT = PUSH + U(W * MAXIMUM_ELBOWS)  # the largest push that friction goes with [N]
-SHARED_ROWS = W * (3 * _MATRIX + 6 * MAXIMUM_ELBOWS + 4)
+SHARED_ROWS = W * (3 * _MATRIX + 6 * MAXIMUM_ELBOWS + 6)
 
 
 def offsets(

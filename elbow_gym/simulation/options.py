@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from elbow_gym.checks import non_negative, positive
+from elbow_gym.checks import friction_coefficient, non_negative, positive
 from elbow_gym.parameters import ArmParameters
 from elbow_gym.table import TableParameters, as_table
 
@@ -19,7 +19,7 @@ class Conditions:
     table: bool | TableParameters | Mapping[str, float] | None = None
     """Compliant table under joints 3..n and the hand: True for the default one, or its fields."""
     elbow_friction: float = 0.0
-    """Coulomb's coefficient of rigid elbows on the table, where they push [-]."""
+    """Coulomb's coefficient of rigid elbows on the table, where they push [-], at most 1."""
     heat: bool = False
     """Whether windings warm up, and their resistance with them."""
     supply_voltage: float = 24.0
@@ -30,8 +30,9 @@ class Conditions:
     """Whether the supply takes current back."""
 
     def __post_init__(self) -> None:
-        for name in ("payload", "elbow_friction", "supply_resistance"):
+        for name in ("payload", "supply_resistance"):
             object.__setattr__(self, name, non_negative(name, getattr(self, name)))
+        object.__setattr__(self, "elbow_friction", friction_coefficient("elbow_friction", self.elbow_friction))
         object.__setattr__(self, "supply_voltage", positive("supply_voltage", self.supply_voltage))
         object.__setattr__(self, "table", None if self.table is None else as_table(self.table))
         for name in ("heat", "regeneration"):

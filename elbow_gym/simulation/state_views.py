@@ -100,9 +100,12 @@ class Readings:
 
     @property
     def constraint_residual(self) -> Array:
-        """Largest vertical acceleration of an elbow in spite of its force [m/s^2], (B,); zero to rounding.
+        """Largest vertical acceleration that an elbow has in spite of its force [m/s^2], (B,); zero to rounding.
 
-        Where the elbows' matrix is singular, as when two elbows cannot move against each other, it is larger.
+        It is larger where the elbows' matrix is singular, as when two elbows cannot move against each other; after a
+        step that did not resolve such a pose, by the elbow's mean acceleration in it; and after one in which friction
+        jammed an elbow, so that no force agreed with Coulomb's law, by the acceleration that the friction was short
+        of. Motion and energy are then not to be trusted.
         """
         return self._columns(RESIDUAL, RESIDUAL + 1)[:, 0]
 

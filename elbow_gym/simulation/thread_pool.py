@@ -7,7 +7,7 @@ import threading
 import weakref
 from collections.abc import Callable, Iterable
 from queue import SimpleQueue
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,11 +20,10 @@ class Answer(NamedTuple):
 
 
 class Task(NamedTuple):
-    """A share of the arms, what to do with it, and where the answer goes."""
+    """What to do, with what, the range of arms last, and where the answer goes."""
 
-    work: Callable[[int, int], int]
-    first: int
-    end: int
+    work: Callable[..., int]
+    arguments: tuple[Any, ...]
     answers: SimpleQueue[Answer]
 
 
@@ -52,16 +51,16 @@ class Sharing:
             threading.Thread(target=_serve, args=(inbox,), name="elbow_gym", daemon=True).start()
         weakref.finalize(self, _dismiss, self._inboxes)
 
-    def total(self, work: Callable[[int, int], int]) -> int:
-        """The sum of `work(first, end)` over all shares, when every one is done."""
+    def total(self, work: Callable[..., int], *arguments: Any) -> int:
+        """The sum of `work(*arguments, first, end)` over all shares, when every one is done."""
         if not self._inboxes:
-            return work(*self._shares[0])
+            return work(*arguments, *self._shares[0])
         # New for every call, so that an answer which an interrupt left behind is never taken for a later one's.
         answers: SimpleQueue[Answer] = SimpleQueue()
         for inbox, share in zip(self._inboxes, self._shares[1:], strict=True):
-            inbox.put(Task(work, *share, answers))
+            inbox.put(Task(work, (*arguments, *share), answers))
         # This thread takes the first share itself: one hand-over less.
-        total = work(*self._shares[0])
+        total = work(*arguments, *self._shares[0])
         for _ in self._inboxes:
             answer = answers.get()
             if answer.error is not None:
@@ -80,7 +79,7 @@ def _done(task: Task | None) -> bool:
     if task is None:
         return False
     try:
-        answer = Answer(task.work(task.first, task.end))
+        answer = Answer(task.work(*task.arguments))
     except BaseException as error:
         answer = Answer(0, error)
     task.answers.put(answer)

@@ -8,12 +8,13 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym.checks import check_entries, check_restorable, require_entries, restore
+from elbow_gym.checks import check_restorable, require_entries, restore
 from elbow_gym.kernel import observe
-from elbow_gym.kernel.rows import FIGURES, RESIDUAL, SUMMARY_COLUMNS
+from elbow_gym.kernel.rows import FIGURES, PAID, RESIDUAL, SUMMARY_COLUMNS, TASK_COLUMNS
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.parameters import Array
-from elbow_gym.simulation.step_limit import check_parameters, rates
+from elbow_gym.simulation.rates import Start, rates
+from elbow_gym.simulation.step_limit import check_option
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.actuation import Actuation
 from elbow_gym.task.arm_batch import Population
@@ -21,10 +22,10 @@ from elbow_gym.task.circle import Circle, check_reachable
 from elbow_gym.task.reward import Price, early_end
 from elbow_gym.task.sensing import Sensing, Snapshot, blank
 from elbow_gym.task.settings import Settings
+from elbow_gym.task.start import above_table, checked_state, given_state
 from elbow_gym.task.targets import Targets
 
 RESET_OPTIONS = ("state", "phase", "circle", "parameters")
-STATE_ENTRIES = ("q", "q_dot", "current", "temperature_rise")
 # The last figure is the reward itself.
 INFO_FIGURES = FIGURES[:-1]
 
@@ -65,13 +66,14 @@ class Episodes:
         )
         self.simulator.period = settings.control_period
         self.num_envs = num_envs
-        self.tracking_weight = float(settings.tracking_weight)
-        self.energy_weight = float(settings.energy_weight)
+        weights = float(settings.tracking_weight), float(settings.energy_weight)
+        self._price = np.array(Price(*weights, settings.control_frequency, settings.regeneration))
         self.pose = self.simulator.on_table(self.arm.nominal_pose)[0]
         """Start pose [rad], (n,): the nominal one, on the elbows' plane. Observed angles count from it."""
         self.population = Population(self.arm, settings.conditions, settings.randomization, num_envs)
-        self.targets = Targets(self.circle, num_envs, settings.control_period)
-        self.actuation = Actuation(settings, self.population, num_envs)
+        self._task = np.zeros((num_envs, TASK_COLUMNS))
+        self.targets = Targets(self.circle, self._task, settings.control_period)
+        self.actuation = Actuation(settings, self.population, self._task)
         self.sensing = Sensing(settings, self.simulator, self.population, self.actuation.queue)
         self.layout = self.sensing.layout
         self._substeps = settings.substeps
@@ -80,14 +82,10 @@ class Episodes:
         self._arms_differ, self._circles_differ = bool(settings.randomization.ranges), self.circle.random
         if settings.start == "on_target" and not self.circle.random:
             inverse_kinematics(self.arm, self.pose, self.circle.position(np.linspace(0.0, 2.0 * np.pi, 73)))
-        self._steps = np.zeros(num_envs, dtype=np.int64)
-        self._spent = np.zeros(num_envs)
         # Arrays that every control period reads and resets bring up to date in place.
-        self._actuated = self.actuation.arguments()
         layout, self._size = self.layout, self.layout.size
-        self._observed = (
-            self.pose, *self.targets.arguments(self._steps), layout.starts, layout.scale, layout.high,
-        )  # fmt: skip
+        scales = np.stack([layout.scale, layout.high])
+        self._asked = (self._task, self.targets.path, self.pose, layout.starts, scales)
 
     @property
     def highest_action(self) -> float:
@@ -98,6 +96,24 @@ class Episodes:
     def volts_per_action(self) -> float:
         """Terminal voltage per unit of action at the nominal supply voltage [V]."""
         return float(self.settings.voltage_limit) / self.highest_action
+
+    @property
+    def tracking_weight(self) -> float:
+        """Cost per metre of tracking error [1/m], from the next step on."""
+        return float(self._price[0])
+
+    @tracking_weight.setter
+    def tracking_weight(self, weight: float) -> None:
+        self._price[0] = weight
+
+    @property
+    def energy_weight(self) -> float:
+        """Cost per watt of electrical power [1/W], from the next step on."""
+        return float(self._price[1])
+
+    @energy_weight.setter
+    def energy_weight(self, weight: float) -> None:
+        self._price[1] = weight
 
     def target(self) -> Array:
         """Present position of each target [m], (B, 3)."""
@@ -127,7 +143,7 @@ class Episodes:
             drawing = [generators[int(i)] for i in chosen]
             self._draw_arms(drawing, chosen, options.get("parameters"))
             if state is not None:
-                self.simulator.check_state(**state, mask=mask)
+                self._check_steps("state", chosen, checked_state(self.simulator, state, mask))
             circles = self.targets.draw(circle, drawing, options.get("phase"))
             self.targets.check(circles)
             if state is None:
@@ -141,8 +157,7 @@ class Episodes:
         self.targets.put(chosen, circles)
         self.actuation.reset(chosen)
         self.sensing.set_noise(chosen, drawing)
-        self._steps[chosen] = 0
-        self._spent[chosen] = 0.0
+        self._task[chosen, PAID] = 0.0
 
     def _differing(self) -> bool:
         """Whether infos tell the arms' parameters: they are drawn, or some arm was given others than the nominal."""
@@ -154,14 +169,19 @@ class Episodes:
         values = self.population.draw(generators, given)
         self.actuation.check(values)
         rows = self.population.put(chosen, values)
-        if given is not None:
-            settings = self.settings
-            found = rates(rows, settings.conditions, values["supply_voltage"], elbows=bool(settings.elbow_joints))
-            check_parameters(float(self._substeps.max()), found, settings.integrator)
         if given is not None and "length" in given:
             for arm in self.population.arms(chosen):
                 check_reachable(arm, self.settings.elbow_joints, self.circle)
         self.simulator.set_parameters(chosen, rows)
+        if given is not None:
+            self._check_steps("parameters", chosen)
+
+    def _check_steps(self, option: str, chosen: NDArray[np.int64], start: Start | None = None) -> None:
+        """Raises ValueError naming the option unless the steps resolve the chosen arms, put in the states given."""
+        settings, rows = self.settings, self.simulator.parameters(chosen)
+        volts = self.population.values["supply_voltage"][chosen]
+        found = rates(rows, settings.conditions, volts, elbows=bool(settings.elbow_joints), start=start)
+        check_option(option, float(self._substeps.max()), found, settings.integrator)
 
     def _given_circle(self, given: object) -> Circle:
         if given is None:
@@ -175,19 +195,20 @@ class Episodes:
     def _draw_pose(
         self, generators: Sequence[np.random.Generator], circles: Sequence[Circle], chosen: NDArray[np.int64]
     ) -> Array:
-        noise, moved = self.settings.start_noise, "length" in self.settings.randomization.ranges
+        settings = self.settings
+        noise, moved = settings.start_noise, "length" in settings.randomization.ranges
         moved = moved or self.population.changed
         q = np.tile(self.pose, (self.num_envs, 1))
         if moved:
             q = self.simulator.on_table(q)
-        if self.settings.start == "on_target":
+        if settings.start == "on_target":
             arms = self.population.arms(chosen) if moved else [self.arm] * len(chosen)
             for i, arm, circle in zip(chosen, arms, circles, strict=True):
                 q[i] = inverse_kinematics(arm, q[i], circle.position(float(circle.phase)))[0]
         if noise > 0.0:
             q[chosen] += noise * np.stack([generator.standard_normal(self.arm.n_joints) for generator in generators])
             q = self.simulator.on_table(q)
-        return q
+        return q if settings.conditions.surface is None else above_table(self.simulator, q)
 
     def step(self, action: Array, waiting: NDArray[np.bool_] | None = None) -> Outcome:
         """One control period under `action`, held and clipped to the supply voltage.
@@ -196,29 +217,25 @@ class Episodes:
 
         Raises ValueError, with the state untouched, when an action is not a number.
         """
-        settings = self.settings
-        price = (self.tracking_weight, self.energy_weight, settings.control_frequency, settings.regeneration)
         snapshot, voltage = blank(self.num_envs, self._size), np.empty_like(action)
-        self._steps += 1
         invalid = self.simulator.control_step(
-            (action, voltage, *self._actuated), self._substeps, (*self._observed, price, self._spent, *snapshot)
+            (action, voltage, self.actuation.queue), self._substeps, (*self._asked, self._price, *snapshot)
         )
         if invalid < 0:
-            self._steps -= 1
             raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
         self.sensing.complete(snapshot.observation, waiting)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
-        truncated = self._steps >= self.horizon
+        truncated = self.simulator.periods >= self.horizon
         if invalid:
             terminated = ~self.simulator.valid
-            self._charge_the_rest(terminated, snapshot, Price(*price))
+            self._charge_the_rest(terminated, snapshot, Price(*self._price.tolist()))
             truncated &= ~terminated
         info = self.info(snapshot, voltage)
         return Outcome(snapshot.observation, snapshot.figure("reward"), terminated, truncated, info)
 
     def _charge_the_rest(self, terminated: NDArray[np.bool_], snapshot: Snapshot, price: Price) -> None:
         """Charges terminated arms the worst reward for the remaining time, this control period included."""
-        rest = np.maximum(self.settings.horizon - self._steps + 1, 1)[terminated]
+        rest = np.maximum(self.settings.horizon - self.simulator.periods + 1, 1)[terminated]
         values = self.population.values
         motors = values["supply_voltage"][terminated], values["armature_resistance"][terminated]
         charge = early_end(self.layout, *motors, price, rest)
@@ -228,17 +245,16 @@ class Episodes:
 
     def angle(self) -> Array:
         """Present angle of each target on its path [rad], (B,)."""
-        return self.targets.angle(self._steps)
+        return self.targets.angle(self.simulator.periods)
 
     def observe(self, resting: NDArray[np.bool_] | None = None) -> Snapshot:
         """Observations of every arm now, between control periods: power and rewards are zero.
 
         Arms of the mask `resting` draw no noise, since they have not been reset.
         """
-        price = (0.0, 0.0, 0.0, self.settings.regeneration)
+        price = self._price * (0.0, 0.0, 0.0, 1.0)
         snapshot = blank(self.num_envs, self._size)
-        observed = (*self._observed, price, self._spent, *snapshot)
-        observe.observe(*self.simulator.raw, *observed, 0, self.num_envs)
+        observe.observe(*self.simulator.raw, *self._asked, price, *snapshot, 0, self.num_envs)
         self.sensing.complete(snapshot.observation, resting)
         return snapshot
 
@@ -261,13 +277,13 @@ class Episodes:
 
     def get_state(self) -> dict[str, Any]:
         """A copy of everything that changes from step to step, except the generators."""
-        own = {"steps": self._steps.copy(), "spent": self._spent.copy()}
+        own = {"steps": self.simulator.periods.copy(), "spent": self._task[:, PAID].copy()}
         parts = {"targets": self.targets.get_state(), "parameters": self.population.copy()}
         return {"simulator": self.simulator.get_state(), **parts, "queue": self.actuation.queue.copy(), **own}
 
     def set_state(self, state: Mapping[str, Any], generators: Sequence[np.random.Generator]) -> None:
         """Restores a state of `get_state` of the same settings and number of arms; takes each arm's generator."""
-        own = {"steps": self._steps, "spent": self._spent, "queue": self.actuation.queue}
+        own = {"steps": self.simulator.periods, "spent": self._task[:, PAID], "queue": self.actuation.queue}
         require_entries(state, (*own, "simulator", "targets", "parameters"), "state")
         check_restorable(own, state)
         self.simulator.set_state(state["simulator"])
@@ -278,15 +294,3 @@ class Episodes:
         self.actuation.take_values()
         self.sensing.set_noise(everyone, generators)
         self._arms_differ = self._differing()
-
-
-def given_state(state: object) -> dict[str, Any] | None:
-    """The reset option `state` with its names checked."""
-    if state is None:
-        return None
-    if not isinstance(state, Mapping):
-        raise ValueError(f"options['state'] must be a dict, got {state!r}")
-    plain = cast("Mapping[str, Any]", state)
-    check_entries(plain, set(STATE_ENTRIES), "options['state']")
-    require_entries(plain, ("q",), "options['state']")
-    return dict(plain)

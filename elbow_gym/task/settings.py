@@ -14,7 +14,8 @@ from elbow_gym.checks import non_negative, positive
 from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import quantities
-from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep, rates, schedule, worst_rows
+from elbow_gym.simulation.rates import rates, worst_rows
+from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep, schedule
 from elbow_gym.table import TableParameters, as_table
 from elbow_gym.task.circle import Circle, as_circle, check_reachable
 from elbow_gym.task.randomization import Randomization
@@ -61,7 +62,7 @@ class Settings:
     table: bool | Mapping[str, Any] | TableParameters = False
     """A compliant table under joints 3..n and the hand: True, or a dict of `TableParameters` fields."""
     elbow_friction: float = 0.0
-    """Coulomb's coefficient of rigid elbows on the table, where they push [-]."""
+    """Coulomb's coefficient of rigid elbows on the table, where they push [-], at most 1."""
     gear_coulomb_friction: float | None = None
     """Coulomb friction of every gear, at the motor shaft [N m]; the arm's own when None."""
     heat: bool = False
@@ -150,7 +151,7 @@ class Settings:
 
     @cached_property
     def rates(self) -> dict[str, float]:
-        """Fastest rates of any arm that may be drawn [1/s], by the names of `step_limit.MECHANISMS`."""
+        """Fastest rates of any arm that may be drawn [1/s], by the names of `rates.MECHANISMS`."""
         arm, ranges = self.parsed_arm, self.randomization.ranges
         rows, volts = worst_rows(quantities(arm), arm.gravity, self.conditions, ranges)
         return rates(rows, self.conditions, volts, elbows=bool(self.elbow_joints))

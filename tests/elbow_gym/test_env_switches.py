@@ -112,6 +112,10 @@ def test_resting_on_the_table_is_seen_and_told():
     [
         ({"payload": -0.1}, r"payload must not be negative, got -0\.1"),
         ({"elbow_friction": "much"}, "elbow_friction must be a number, got 'much'"),
+        (
+            {"elbow_friction": 1.5},
+            r"elbow_friction must be at most 1, above which contacts jam .*, got 1\.5",
+        ),
         ({"table": 3}, "table must be True, False, a dict of its fields or TableParameters, got 3"),
         ({"table": {"stiffness": 0.0}}, r"table stiffness must be positive, got 0\.0"),
         ({"heat": 1}, "heat must be True or False, got 1"),

@@ -27,6 +27,7 @@ def test_table_survives_json():
         ({"stiffness": 0.0}, r"table stiffness must be positive, got 0\.0"),
         ({"friction_velocity": -0.01}, r"table friction_velocity must be positive, got -0\.01"),
         ({"dissipation": -1}, "table dissipation must not be negative, got -1"),
+        ({"friction": 1.01}, r"table friction must be at most 1, above which contacts jam in common poses, got 1\.01"),
         ({"friction": math.nan}, "table friction must be finite, got nan"),
         ({"friction": "rough"}, "table friction must be a number, got 'rough'"),
         ({"colour": "oak"}, r"table must have only the entries \[.*\], got 'colour'"),

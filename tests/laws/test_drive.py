@@ -9,7 +9,8 @@ from scipy.optimize import brentq
 
 from elbow_gym import Conditions, MotorParameters, Simulator, kinematics, motors, paper_arm
 from elbow_gym.simulation.parameter_rows import parameter_table
-from elbow_gym.simulation.step_limit import limits, rates
+from elbow_gym.simulation.rates import rates
+from elbow_gym.simulation.step_limit import limits
 from tests.support.kernel_calls import uncompiled
 
 # Rotors too heavy to move and hardly driven: L di/dt = v - R i alone.

@@ -212,3 +212,23 @@ def test_a_step_too_long_for_the_table_is_refused(table, limit):
     with pytest.raises(ValueError, match=rf"^timestep must be at most {limit} s, for the rate 'table' .*, got 0.002$"):
         Simulator("paper", 0, conditions=Conditions(table=table), timestep=0.002)
     Simulator("paper", 0, conditions=Conditions(table=table), timestep=0.99 * limit)
+
+
+def test_an_elbow_that_friction_jams_is_told():
+    # Elbow 4 slides under two links that are `lean` from upright; where it jams, friction has no force to agree with.
+    arm, under = paper_arm(), Conditions(table=True, elbow_friction=0.3, heat=True, supply_resistance=0.1)
+    sim = Simulator(arm, 1, conditions=under, timestep=5e-4)
+
+    def slide(lean, speed):
+        q, q_dot = np.zeros(10), np.zeros(10)
+        q[1:4], q_dot[1:4] = (lean, np.pi - 2.0 * lean, lean + 0.5 - np.pi), (speed, -2.0 * speed, speed)
+        sim.reset(q, q_dot)
+        zero = np.zeros(10)
+        found = dynamics.forward_dynamics(arm, q, q_dot, zero, zero, (4,), table=TableParameters(), elbow_friction=0.3)
+        return sim.constraint_residual[0], sim.elbow_force[0] - found.elbow_force
+
+    for lean, speed in ((0.02, -1.0), (0.05, 1.0), (0.3, 1.0), (0.3, -1.0), (0.7, 1.0)):
+        residual, wrong = slide(lean, speed)
+        assert residual < 1e-12
+        assert np.abs(wrong).max() < 1e-8
+    assert slide(0.02, 1.0)[0] > 0.1

@@ -1,0 +1,96 @@
+"""Start states of episodes: poses drawn and raised above a compliant table, given ones checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from elbow_gym.checks import check_entries, require_entries
+from elbow_gym.kernel.rows import PARAMETERS
+from elbow_gym.kinematics import pitches
+from elbow_gym.parameters import Array
+from elbow_gym.simulation.rates import Start
+from elbow_gym.simulator import PLANE_TOLERANCE, Simulator
+
+STATE_ENTRIES = ("q", "q_dot", "current", "temperature_rise")
+# Raising links between rigid elbows and putting these back on the table comes closer each time [rounds].
+ROUNDS = 200
+
+
+def given_state(state: object) -> dict[str, Any] | None:
+    """The reset option `state` with its names checked."""
+    if state is None:
+        return None
+    if not isinstance(state, Mapping):
+        raise ValueError(f"options['state'] must be a dict, got {state!r}")
+    plain = cast("Mapping[str, Any]", state)
+    check_entries(plain, set(STATE_ENTRIES), "options['state']")
+    require_entries(plain, ("q",), "options['state']")
+    return dict(plain)
+
+
+def checked_state(simulator: Simulator, state: Mapping[str, Any], mask: NDArray[np.bool_] | None) -> Start:
+    """What moves or is warm in the chosen arms' given states.
+
+    Raises ValueError as `Simulator.check_state` does, and where a joint or the hand lies deeper in the compliant table
+    than (n - 1) times the weight of arm and payload presses it at one point: as all of them would that stretch out from
+    the end of one link.
+    """
+    q, q_dot, current, rise, chosen = simulator.check_state(**state, mask=mask)
+    surface = simulator.conditions.surface
+    if surface is not None:
+        rows = simulator.parameters(np.flatnonzero(chosen))
+        mass, gravity, payload = (rows[:, PARAMETERS.index(name)] for name in ("mass", "gravity", "payload"))
+        weight = gravity[:, 0] * (mass.sum(axis=1) + payload[:, 0])
+        deepest = (mass.shape[1] - 1) * weight / surface.stiffness
+        depth = np.maximum(-_heights(q[chosen], rows), 0.0)
+        excess = depth - deepest[:, None]
+        if excess.max() > 0.0:
+            arm, point = np.unravel_index(int(excess.argmax()), excess.shape)
+            raise ValueError(
+                f"options['state'] q must have joint {point + 3} at most {deepest[arm]:.3g} m deep in the table (joint "
+                f"{mass.shape[1] + 1} is the hand), got {depth[arm, point]:.6g} m"
+            )
+    return Start(q_dot[chosen], current[chosen], rise[chosen])
+
+
+def above_table(simulator: Simulator, q: Array) -> Array:
+    """Poses (B, n) [rad] whose joints and hand are not below the compliant table, with the elbows at z = 0.
+
+    From base to tip, a link whose end is below z = 0 is turned until its end lies on the table; the other links keep
+    their absolute pitch. Poses that are above it already stay as they are.
+
+    Raises ValueError where rigid elbows leave no such pose near one of `q`.
+    """
+    everyone = simulator.parameters(np.arange(simulator.num_envs))
+    for _ in range(ROUNDS):
+        if _heights(q, everyone).min() >= -PLANE_TOLERANCE:
+            return q
+        q = _raised(q, everyone)
+        if simulator.elbows:
+            q = simulator.on_table(q)
+    raise ValueError(
+        f"start_noise must leave poses above the table with the elbows {simulator.elbows} at z = 0, got a joint "
+        f"{-_heights(q, everyone).min():.3g} m below"
+    )
+
+
+def _heights(q: Array, rows: Array) -> Array:
+    """Heights of joints 3..n and, last, the hand [m], (k, n - 1)."""
+    return np.cumsum(rows[:, PARAMETERS.index("length")] * np.cos(pitches(q)), axis=1)[:, 1:]
+
+
+def _raised(q: Array, rows: Array) -> Array:
+    length, pitch = rows[:, PARAMETERS.index("length")], pitches(q)
+    turn, height = np.zeros_like(q), np.zeros(len(q))
+    for a in range(1, q.shape[1]):
+        low = height + length[:, a] * np.cos(pitch[:, a]) < -PLANE_TOLERANCE
+        # The nearest pitch that puts the end at z = 0: the link's start is above that, by less than its length.
+        wrapped = np.arctan2(np.sin(pitch[:, a]), np.cos(pitch[:, a]))
+        lying = np.copysign(np.arccos(np.clip(-height / length[:, a], -1.0, 1.0)), wrapped)
+        turn[:, a] = np.where(low, lying - wrapped, 0.0)
+        height = height + length[:, a] * np.cos(pitch[:, a] + turn[:, a])
+    return q + np.diff(turn, axis=1, prepend=0.0)
