@@ -111,7 +111,7 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     | energy_weight | 0.001 | cost per watt of electrical power |
     | regeneration | True | whether negative electrical power is credited, and taken back by the supply |
     | table | False | a compliant table that cannot pull: True, or a dict of stiffness, dissipation, friction... |
-    | elbow_friction | 0.0 | Coulomb's coefficient of rigid elbows, where they push |
+    | elbow_friction | 0.0 | Coulomb's coefficient of rigid elbows, where they push; at most 1 |
     | gear_coulomb_friction | None | Coulomb friction of every gear at the motor shaft [N m] |
     | heat | False | whether windings warm up and their resistance grows |
     | supply_resistance | 0.0 | resistance inside the motors' common supply [ohm] |
