@@ -97,7 +97,7 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     | Argument | Default | Meaning |
     |----------|---------|---------|
     | elbows | 2 | 0, 1, 2 as in the paper (joints (), (4,), (4, 7)), or a tuple of joint numbers |
-    | arm | "paper" | preset name, an `ArmParameters`, or its JSON dict |
+    | arm | "paper" | preset name, path of a JSON file, an `ArmParameters`, or its JSON dict |
     | control_frequency | 50.0 | control periods, each with one action, per second [Hz] |
     | timestep | None | longest step of the integrator [s], refused where it is too long; None: chosen for accuracy |
     | integrator | "exponential" | Runge-Kutta of order 4 with exact decay of the currents, or "rk4" for the classical |

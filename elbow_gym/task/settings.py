@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 
 from elbow_gym.checks import non_negative, positive
-from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
+from elbow_gym.parameters import ARM_SUFFIX, ArmParameters, Array, as_arm, as_elbows
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import quantities
 from elbow_gym.simulation.rates import rates, worst_rows
 from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep, schedule
 from elbow_gym.table import TableParameters, as_table
 from elbow_gym.task.circle import Circle, as_circle, check_reachable
+from elbow_gym.task.default_circle import default_circle
 from elbow_gym.task.randomization import Randomization
 
 ACTION_UNITS = ("fraction", "volt")
@@ -31,7 +32,7 @@ class Settings:
     elbows: int | tuple[int, ...] = 2
     """Elbows on the table: 0, 1, 2 as in the paper (joints (), (4,), (4, 7)), or joint numbers held at z = 0."""
     arm: str | ArmParameters | Mapping[str, Any] = "paper"
-    """Preset name, an ArmParameters, or its JSON dict."""
+    """Preset name, path of a JSON file, an ArmParameters, or its JSON dict; a file is read once, into a dict."""
     control_frequency: float = 50.0
     """Control periods per second [Hz]; an action is held for one."""
     timestep: float | None = None
@@ -52,7 +53,8 @@ class Settings:
     start_noise: float = 0.02
     """Standard deviation of the start pose [rad], projected onto the elbows' plane."""
     circle: Mapping[str, Any] | Circle | None = None
-    """Dict of `Circle` fields, the paper's where one is missing."""
+    """Dict of `Circle` fields, the paper's where one is missing; None: the paper's, or one in the reach of an arm that
+    cannot follow it with its last two links."""
     tracking_weight: float = 1.0
     """Cost per metre of tracking error [1/m]."""
     energy_weight: float = 0.001
@@ -75,6 +77,9 @@ class Settings:
     """Dict of ranges that `Randomization` draws from at each reset."""
 
     def __post_init__(self) -> None:
+        if isinstance(self.arm, str) and self.arm.endswith(ARM_SUFFIX):
+            # The file may change, and what is saved of these settings must not change with it.
+            object.__setattr__(self, "arm", as_arm(self.arm).to_dict())
         for name in ("control_frequency", "duration", "voltage_limit"):
             positive(name, getattr(self, name))
         for name in ("start_noise", "tracking_weight", "energy_weight"):
@@ -126,7 +131,7 @@ class Settings:
     @cached_property
     def parsed_circle(self) -> Circle:
         """The circle that `circle` describes."""
-        return as_circle(self.circle)
+        return default_circle(self.parsed_arm, self.elbow_joints) if self.circle is None else as_circle(self.circle)
 
     @cached_property
     def elbow_joints(self) -> tuple[int, ...]:
