@@ -15,9 +15,6 @@ from elbow_gym.baselines.policy import Policy, Weights, pair
 from elbow_gym.baselines.policy_card import PolicyCard
 from elbow_gym.task.settings import Settings
 
-BEST = "best"
-"""Name of the best policy's files in a run's folder and in its checkpoints."""
-
 
 def policy_of(model: Any, settings: Settings, command: str, env: str = "ElbowArm-v0", **more: dict[str, Any]) -> Policy:
     """The deterministic actor of an SB3 model (PPO's or SAC's kind) as a `Policy`.

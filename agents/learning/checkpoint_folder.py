@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.files import read_json, write_folder
-from agents.learning.actor import BEST, files_of
+from agents.learning.actor import files_of
+from agents.tasks import BEST
 from elbow_gym.baselines.policy import Policy, pair, read_policy
 
 PROGRESS, MODEL, BUFFER, STATE = "progress.json", "model.zip", "replay_buffer.npz", "state.pkl"

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from agents.files import read_json
-from agents.learning.actor import BEST, copy_policy
+from agents.learning.actor import copy_policy
 from agents.learning.run_folder import RunFolder
 from agents.shipped import CURVES, POLICIES
+from agents.tasks import BEST
 from elbow_gym.baselines.policy import BASELINES, pair
 from elbow_gym.baselines.tasks import task_name
 

@@ -31,9 +31,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from agents.files import copy_whole, read_json, write_csv, write_json
-from agents.learning.actor import BEST, copy_policy, save_policy
+from agents.learning.actor import copy_policy, save_policy
 from agents.learning.checkpoint_folder import Checkpoint, write_checkpoint
 from agents.learning.evaluation import COLUMNS
+from agents.tasks import BEST
 from elbow_gym.baselines.policy import Policy, pair, read_policy
 
 RECORD, RESULT, EVALUATIONS, TENSORBOARD = "run.json", "result.json", "evaluations.csv", "tensorboard"

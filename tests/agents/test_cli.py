@@ -17,7 +17,7 @@ from agents.cli import Commands, Count, JsonObject, Seed, spelled
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = {
-    "agents": ("reproduce", "train", "clone", "publish", "evaluate", "report", "watch"),
+    "agents": ("reproduce", "train", "clone", "publish", "evaluate", "verify", "export", "report", "watch"),
     "benchmarks": ("energy", "learning", "optimal", "speed"),
 }
 
@@ -304,7 +304,7 @@ def groups(said):
 
 def test_help_of_an_algorithm_groups_its_options_apart_and_shows_the_defaults_that_apply():
     found = groups(said := said_by("-m", "agents", "train", "ppo", "--help"))
-    assert found["task options"] == {"--env", "--elbows", "--environment"}
+    assert found["task options"] == {"--env", "--elbows", "--arm", "--environment"}
     assert {"--seeds", "--output", "--label"} <= found["run options"]
     assert {"--total-timesteps", "--gamma", "--clip-range"} <= found["algorithm options"]
     assert "--tau" not in said
