@@ -15,11 +15,11 @@ from typing import Any
 
 from agents.control.trajectory import Trajectory
 from agents.files import check_writable, read_json, write_csv, write_text
+from agents.machine import machine, versions
 from agents.optimal.bound import Optimum, SolveError, optimum, posture_guesses
 from agents.optimal.collocation import Problem
 from agents.shipped import OPTIMA
 from agents.workers import Pool, compile_before
-from benchmarks.machine import machine, versions
 from elbow_gym.task.settings import Settings
 
 DEFAULT_WEIGHT = 0.001

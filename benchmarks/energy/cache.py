@@ -6,7 +6,6 @@ import hashlib
 import json
 import sys
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.files import read_arrays, write_whole
+from agents.machine import code
 
-ROOT = Path(__file__).parents[2]
-CODE = ("elbow_gym/**/*.py", "agents/control/*.py", "agents/evaluation/*.py", "agents/tasks.py")
-"""Patterns of the files that the results depend on."""
 MAY_BE_MISSING = "smallest_elbow_force"
 """Metric that a run without elbows has as NaN."""
-PICTURES = "rendering"
-"""Folder of elbow_gym that only draws, so that no result depends on it."""
-
 Results = dict[str, dict[str, NDArray[np.float64]]]
 
 
@@ -30,17 +24,6 @@ def key(question: Mapping[str, Any]) -> str:
     """Name of a result: digest of its question, in JSON types, and of the code."""
     text = json.dumps(question, sort_keys=True)
     return hashlib.sha256(f"{code()}{text}".encode()).hexdigest()[:32]
-
-
-@cache
-def code() -> str:
-    """Digest of the files of `CODE`."""
-    digest = hashlib.sha256()
-    for pattern in CODE:
-        for path in sorted(ROOT.glob(pattern)):
-            if path.parent.name != PICTURES:
-                digest.update(path.read_bytes())
-    return digest.hexdigest()
 
 
 def load(name: str, folder: Path) -> Results | None:
