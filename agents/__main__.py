@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-from tyro.conf import OmitArgPrefixes, Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from agents.cli import Commands, Count, Seed
 from agents.task_options import TaskOptions
@@ -137,15 +137,23 @@ def export(
 
 
 @app.command
-def report(output: Path = Path("report.html")) -> None:
+def report(
+    output: Path = Path("report.html"),
+    players: Annotated[UseAppendAction[tuple[str, ...]], arg(name="with", metavar="WHAT")] = (),
+    trust: bool = False,
+) -> None:
     """Writes one HTML page: replays of every controller, the paper's Figs 1-25 and the benchmark.
 
     Args:
         output: File of the page, which opens without a network.
+        players: Player of your own, as `python -m agents evaluate --help` says, beside the others; may be given several
+            times. Its numbers are of one episode without start noise.
+        trust: Whether to read a .zip, whose pickles can run any code when they are read.
     """
+    from agents.evaluation.guest import Guest
     from agents.report.command import report as write_report
 
-    write_report(output)
+    write_report(output, guests=[Guest.named(name, trust) for name in players])
 
 
 @app.command

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ from agents.evaluation.player import Player
 from agents.evaluation.players import find_player
 from agents.style import CONTROLLER_NAMES
 from agents.tasks import Elbows
+from elbow_gym.vector_env import ElbowArmVectorEnv
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,3 +46,22 @@ class Guest:
         """
         player = find_player(self.what, elbows, arguments=arguments, trust=self.trust)
         return relabelled(player, self.label)
+
+    def plays_at(self, counts: Sequence[int]) -> list[int]:
+        """The elbow counts of the default environment that the player can play at, out of some.
+
+        Raises:
+            ValueError: it can play at none; the message says why.
+        """
+        found, refusals = [], []
+        for elbows in counts:
+            try:
+                player = self.player(elbows, {})
+                player.make(ElbowArmVectorEnv(1, **player.settings.arguments))
+            except ValueError as refusal:
+                refusals.append(str(refusal))
+            else:
+                found.append(elbows)
+        if not found:
+            raise ValueError(refusals[0])
+        return found

@@ -15,7 +15,6 @@ from agents.evaluation.regimes import SHIFTED
 from agents.style import CONTROLLER_NAMES
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP, PDController
 from elbow_gym.task.settings import Settings
-from elbow_gym.vector_env import ElbowArmVectorEnv
 
 PARTS = {
     "nominal": "the default environment",
@@ -86,20 +85,7 @@ def guest_cells(guests: Sequence[Guest], counts: Sequence[int]) -> list[Cell]:
     labels = [guest.label for guest in guests]
     if len(set(labels)) < len(labels):
         raise ValueError(f"labels of players of your own must differ, got {labels}")
-    found = []
-    for guest in guests:
-        refusals: list[str] = []
-        for elbows in counts:
-            try:
-                player = guest.player(elbows, {})
-                player.make(ElbowArmVectorEnv(1, **player.settings.arguments))
-            except ValueError as refusal:
-                refusals.append(str(refusal))
-            else:
-                found.append(Cell(guest.label, elbows, guest=guest))
-        if len(refusals) == len(counts):
-            raise ValueError(refusals[0])
-    return found
+    return [Cell(guest.label, elbows, guest=guest) for guest in guests for elbows in guest.plays_at(counts)]
 
 
 def own_arm_cells(arguments: Mapping[str, Any], guests: Sequence[Guest] = ()) -> list[Cell]:
