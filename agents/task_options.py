@@ -95,6 +95,6 @@ class TaskOptions:
         """Says on stderr which circle an arm of the user's own follows."""
         if self.arm is None:
             return
-        circle = settings.parsed_circle
-        center = ", ".join(f"{value:.4g}" for value in circle.widest.center)
-        print(f"{self.arm}: circle of {circle.radius} m around ({center}) m", file=sys.stderr)
+        circle = settings.parsed_circle.widest
+        center = ", ".join(f"{value:.4g}" for value in circle.center)
+        print(f"{self.arm}: circle of {circle.radius:.4g} m around ({center}) m", file=sys.stderr)

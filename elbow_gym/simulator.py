@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from elbow_gym.checks import as_batch, positive, positive_integer, restore
+from elbow_gym.kernel import observe
 from elbow_gym.kernel.build import announced, kernel
 from elbow_gym.kernel.rows import (
     LARGEST_ANGLE,
@@ -34,6 +35,9 @@ from elbow_gym.simulation.thread_pool import Sharing
 # A given pose may be off the elbows' plane by this much [m], its rates by this much [m/s].
 PLANE_TOLERANCE = 1e-8
 RATE_TOLERANCE = 1e-6
+
+# Parts that a step is divided into where whole steps lead to a state that cannot be represented.
+FINER = (8, 64)
 
 
 class Simulator(Readings):
@@ -234,13 +238,30 @@ class Simulator(Readings):
             task: its arguments behind the clock.
 
         Returns:
-            The number of arms that are not `valid`; a negative one, with nothing changed, where an action is NaN.
+            The number of arms that are not `valid`, in finer steps neither; a negative one, with nothing changed, where
+            an action is NaN.
         """
         # One share checks its own actions before it moves; several must not move before all are checked.
         if self._num_threads > 1 and np.isnan(actions[0]).any():
             return -1
         own = (self._state, self._parameters, self._elbow_index, steps, self._summary, self._clock)
-        return self._share("control_step", *actions, *own, *task)
+        invalid = self._share("control_step", *actions, *own, *task)
+        return self._taken_again(actions[1], steps, task) if invalid > 0 else invalid
+
+    def _taken_again(self, voltage: Array, steps: Array, task: tuple[NDArray[Any], ...]) -> int:
+        """Takes arms that steps made unrepresentable, and which are where they were, through finer ones.
+
+        Elbows that for an instant can hardly move against each other need them. Returns the number of arms that are
+        not `valid` after that.
+        """
+        for share in FINER:
+            finer = np.repeat(steps / share, share)
+            for arm in np.flatnonzero(~self.valid):
+                one = (int(arm), int(arm) + 1)
+                moved = (self._state, self._parameters, voltage, self._elbow_index, finer, self._summary)
+                if not self._kernel.advance(*moved, *one):
+                    observe.observe(self._state, self._summary, self._clock, *task, *one)
+        return int((~self.valid).sum())
 
     @property
     def raw(self) -> tuple[Array, Array, NDArray[np.int64]]:
