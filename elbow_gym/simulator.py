@@ -278,6 +278,10 @@ class Simulator(Readings):
         self._called.add(name)
         return total
 
+    def close(self) -> None:
+        """Ends the threads. May be called twice; what steps afterwards starts them again."""
+        self._sharing.close()
+
     def get_state(self) -> dict[str, NDArray[Any]]:
         """A copy of the state, summary and clock; `set_state` continues from it bit for bit."""
         return {"state": self._state.copy(), "summary": self._summary.copy(), "clock": self._clock.copy()}

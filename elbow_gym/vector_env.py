@@ -212,10 +212,11 @@ class ElbowArmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         return self._viewer.render(bool(self._started.all()))
 
     def close_extras(self, **_kwargs: Any) -> None:
-        """Closes the window, if there is one."""
+        """Closes the window, if there is one, and ends the threads; a later step starts them again."""
         # Gymnasium 1.2 closes what is collected, even if its construction has failed.
         if hasattr(self, "_viewer"):
             self._viewer.close()
+            self._episodes.simulator.close()
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """An attribute of every arm, or a method's answer, as `SyncVectorEnv` has it; the method is called once."""
