@@ -74,6 +74,7 @@ def test_a_disk_that_takes_nothing_is_told_and_the_call_is_made(folder, capsys, 
     assert (misses(folder), misses(folder)) == (1, 0)
 
 
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 def test_a_killed_process_frees_its_lock(tmp_path):
     path = tmp_path / "lock"
     ready, told = os.pipe()

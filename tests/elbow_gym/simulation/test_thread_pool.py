@@ -12,6 +12,9 @@ import pytest
 from elbow_gym import ElbowArmVectorEnv, Simulator
 from elbow_gym.simulation.thread_pool import Sharing
 
+# Python 3.12 and later warn of every fork of a process with threads.
+FORKS = pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+
 
 @pytest.mark.parametrize(("arms", "lanes", "threads"), [(1, 1, 1), (5, 1, 3), (16, 16, 4), (40, 16, 2), (100, 16, 3)])
 def test_every_arm_is_in_one_share_and_no_block_is_cut(arms, lanes, threads):
@@ -67,12 +70,13 @@ def test_closing_ends_the_threads_and_the_next_call_starts_new_ones():
     assert len(set(threading.enumerate()) - before) == 2
     env.close()
     env.close()
-    assert set(threading.enumerate()) == before
+    assert set(threading.enumerate()) <= before
     env.reset(seed=0)
     np.testing.assert_array_equal(env.step(np.zeros((40, 10)))[0], expected)
     env.close()
 
 
+@FORKS
 def test_a_forked_process_steps_with_threads_of_its_own():
     simulator = Simulator(num_envs=40, num_threads=2)
     simulator.step(np.ones(10))
