@@ -96,10 +96,18 @@ def require_entries(plain: Mapping[str, Any], required: Iterable[str], owner: st
             raise ValueError(f"{owner} must have the entry {name!r}, got {sorted(map(str, plain))}")
 
 
+def real(value: Any) -> Any:
+    """The value. Raises TypeError for complex arrays, whose imaginary part NumPy would drop with a warning."""
+    kind: Any = getattr(value, "dtype", None)
+    if kind is not None and kind.kind == "c":
+        raise TypeError("complex")
+    return value
+
+
 def as_numbers(name: str, value: ArrayLike, *shapes: tuple[int, ...]) -> NDArray[np.float64]:
     """The value as a contiguous float64 array; ValueError naming `name` unless it is numbers of one of the shapes."""
     try:
-        array = np.asarray(value, dtype=np.float64, order="C")
+        array = np.asarray(real(value), dtype=np.float64, order="C")
     except (OverflowError, TypeError, ValueError) as error:
         raise ValueError(f"{name} must be numbers of shape {_listed(shapes)}, got {shown(value)}") from error
     if array.shape not in shapes:

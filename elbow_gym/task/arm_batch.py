@@ -60,7 +60,10 @@ class Population:
         k = len(values["payload"])
         every = {name: np.repeat(value[None], k, axis=0) for name, value in self.nominal.items() if value.ndim}
         every |= {name: values[name] for name in FACTORS}
-        return parameter_rows(every, self._arm.gravity, self._conditions, values["payload"], values["supply_voltage"])
+        load, supply = values["payload"], values["supply_voltage"]
+        # What is beyond float64 makes rates that the steps' check refuses.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return parameter_rows(every, self._arm.gravity, self._conditions, load, supply)
 
     def checked(self, values: object, count: int) -> dict[str, Array]:
         """Values of `count` arms by name from a saved state. Raises ValueError naming one that no arm can have."""

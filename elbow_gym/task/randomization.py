@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from elbow_gym.checks import check_entries, non_negative, positive, shown
+from elbow_gym.checks import check_entries, non_negative, positive, real, shown
 from elbow_gym.parameters import Array
 from elbow_gym.task.ranges import Range, as_range, ends
 
@@ -99,7 +99,7 @@ class Randomization:
         checked: dict[str, Array] = {}
         for name, value in plain.items():
             try:
-                array = np.broadcast_to(np.asarray(value, dtype=np.float64), nominal[name].shape).copy()
+                array = np.broadcast_to(np.asarray(real(value), dtype=np.float64), nominal[name].shape).copy()
             except (OverflowError, TypeError, ValueError) as error:
                 shape = nominal[name].shape
                 raise ValueError(

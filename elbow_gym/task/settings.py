@@ -140,7 +140,8 @@ class Settings:
             volts: their supply voltages [V], (k,).
             start: what moves or is warm in their states; nothing when None.
         """
-        found = rates(rows, self.conditions, volts, elbows=bool(self.elbow_joints), start=start)
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = rates(rows, self.conditions, volts, elbows=bool(self.elbow_joints), start=start)
         check_option(option, float(self.substeps.max()), found, self.integrator)
 
     def _shortest_arm(self) -> ArmParameters:
