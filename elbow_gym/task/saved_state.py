@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, cast
 
@@ -82,7 +81,7 @@ def checked_marks(state: Mapping[str, Any], generators: Sequence[np.random.Gener
     trial = type(generators[0].bit_generator)(0)
     for saved in state["generators"]:
         try:
-            trial.state = copy.deepcopy(saved)
+            trial.state = saved
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             raise ValueError(
                 f"state['generators'] must have states of {type(trial).__name__}, got {saved!r}"
