@@ -96,6 +96,8 @@ class Simulator(Readings):
         """Length of a control period [s], by which `control_step` moves the clock."""
         self._attach()
         self._nominal = as_batch("nominal_pose", self.arm.nominal_pose, (self.num_envs, n))
+        if np.abs(self._nominal).max() >= LARGEST_ANGLE:
+            raise ValueError(f"nominal_pose must be within {LARGEST_ANGLE:g} rad, got {np.abs(self._nominal).max():g}")
         if self.elbows and np.abs(elbow_heights(self.arm, self.arm.nominal_pose, self.elbows)).max() > PLANE_TOLERANCE:
             self._nominal = self.on_table(self.arm.nominal_pose)
         self.reset()

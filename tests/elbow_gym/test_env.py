@@ -341,6 +341,10 @@ def test_an_interrupted_reset_has_drawn_nothing(monkeypatch):
             {"circle": {"center": [1.5, 1.5, [-0.1, 0.4]]}, "table": True},
             "circle must not go below the table, which pushes, got 0.1 m below z = 0",
         ),
+        (
+            {"arm": paper_arm().to_dict() | {"nominal_pose": [1e308] * 10}},
+            "nominal_pose must be within 100000 rad, got ",
+        ),
         ({"duration": 1e9}, "duration must be a countable number of control periods, got 1000000000.0"),
         ({"duration": HUGE}, "duration must be finite, got an integer of more than twenty digits"),
         ({"action_unit": ["volt"]}, r"action_unit must be one of .*, got \['volt'\]"),
