@@ -28,7 +28,7 @@ from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
 from elbow_gym.simulation.options import Conditions, as_conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.simulation.rates import rates
-from elbow_gym.simulation.state_checks import PLANE_TOLERANCE, check_on_table, checked_arrays
+from elbow_gym.simulation.state_checks import PLANE_TOLERANCE, check_angles, check_on_table, checked_arrays
 from elbow_gym.simulation.state_views import Readings
 from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep
 from elbow_gym.simulation.thread_pool import Sharing
@@ -96,8 +96,7 @@ class Simulator(Readings):
         """Length of a control period [s], by which `control_step` moves the clock."""
         self._attach()
         self._nominal = as_batch("nominal_pose", self.arm.nominal_pose, (self.num_envs, n))
-        if np.abs(self._nominal).max() >= LARGEST_ANGLE:
-            raise ValueError(f"nominal_pose must be within {LARGEST_ANGLE:g} rad, got {np.abs(self._nominal).max():g}")
+        check_angles("nominal_pose", self._nominal)
         if self.elbows and np.abs(elbow_heights(self.arm, self.arm.nominal_pose, self.elbows)).max() > PLANE_TOLERANCE:
             self._nominal = self.on_table(self.arm.nominal_pose)
         self.reset()
@@ -194,8 +193,7 @@ class Simulator(Readings):
         chosen = np.ones(self.num_envs, dtype=np.bool_) if mask is None else np.asarray(mask, dtype=np.bool_)
         if chosen.shape != (self.num_envs,):
             raise ValueError(f"mask must have shape {(self.num_envs,)}, got {chosen.shape}")
-        if np.abs(q).max() >= LARGEST_ANGLE:
-            raise ValueError(f"q must be within {LARGEST_ANGLE:g} rad, got {np.abs(q).max():g}")
+        check_angles("q", q)
         if self.elbows:
             check_on_table(self.elbows, q[chosen], q_dot[chosen], self._parameters[chosen, 0])
         return q, q_dot, current, rise, chosen
@@ -273,25 +271,23 @@ class Simulator(Readings):
 
     def get_state(self) -> dict[str, NDArray[Any]]:
         """A copy of the state, summary and clock; `set_state` continues from it bit for bit."""
-        return {"state": self._state.copy(), "summary": self._summary.copy(), "clock": self._clock.copy()}
+        return {name: array.copy() for name, array in self._own().items()}
+
+    def _own(self) -> dict[str, NDArray[Any]]:
+        return {"state": self._state, "summary": self._summary, "clock": self._clock}
 
     def set_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Restores a state of `get_state` of a simulator of the same size, arm, elbows and conditions.
-
-        Raises ValueError, with nothing changed, naming an array that is missing, of another size, not finite, negative
-        where it counts, or that has an elbow off the table.
-        """
+        """Restores a state of an equal simulator. Raises ValueError as `checked_arrays`, with nothing changed."""
         self.put(np.arange(self.num_envs), self.checked(state, self._parameters[:, 0]))
 
     def checked(self, state: object, length: Array) -> dict[str, NDArray[Any]]:
         """The arrays of a saved state of arms with the lengths [m], (k, n), by name. Raises as `set_state`."""
-        own = {"state": self._state, "summary": self._summary, "clock": self._clock}
-        return checked_arrays(own, state, self.elbows, length)
+        return checked_arrays(self._own(), state, self.elbows, length)
 
     def put(self, chosen: NDArray[np.int64], saved: Mapping[str, NDArray[Any]]) -> None:
         """Gives the chosen arms, (k,), states that `checked` has passed, of k arms or of one for all."""
-        self._state[chosen], self._summary[chosen] = saved["state"], saved["summary"]
-        self._clock[chosen] = saved["clock"]
+        for name, array in self._own().items():
+            array[chosen] = saved[name]
 
     @property
     def time(self) -> Array:

@@ -22,6 +22,12 @@ DRIFT = 100.0
 GROWING = [STATE.index(name) for name in ("drawn_energy", "copper_loss", "friction_loss")]
 
 
+def check_angles(name: str, q: Array) -> None:
+    """Raises ValueError naming `name` where an angle [rad] is beyond what an arm can represent."""
+    if np.abs(q).max() >= LARGEST_ANGLE:
+        raise ValueError(f"{name} must be within {LARGEST_ANGLE:g} rad, got {np.abs(q).max():g}")
+
+
 def check_on_table(elbows: Sequence[int], q: Array, q_dot: Array, length: Array, slack: float = 1.0) -> None:
     """Raises ValueError naming an elbow that is not at z = 0 or moves off it.
 
@@ -68,8 +74,7 @@ def checked_arrays(
     if not ((valid == 0.0) | (valid == 1.0)).all() or saved["summary"][:, BELOW_TABLE].min() < 0.0:
         raise ValueError("state['summary'] must be of `get_state`, got a time below the table or a mark that is not")
     q, q_dot = saved["state"][:, 0], saved["state"][:, 1]
-    if np.abs(q).max() >= LARGEST_ANGLE:
-        raise ValueError(f"q must be within {LARGEST_ANGLE:g} rad, got {np.abs(q).max():g}")
+    check_angles("q", q)
     if elbows:
         check_on_table(elbows, q, q_dot, length, DRIFT * max(1.0, float(np.abs(q_dot).max())))
     return saved
