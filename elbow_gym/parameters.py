@@ -205,7 +205,7 @@ def as_elbows(elbows: object, n_joints: int) -> tuple[int, ...]:
         if int(elbows) not in paper:
             raise ValueError(f"elbows must be 0, 1, 2 or a tuple of joint numbers, got {elbows!r}")
         joints = paper[int(elbows)]
-    elif isinstance(elbows, list | tuple | np.ndarray):
+    elif isinstance(elbows, list | tuple) or (isinstance(elbows, np.ndarray) and elbows.ndim == 1):
         listed = cast("Sequence[object]", elbows)
         if not all(isinstance(e, numbers.Integral) and not isinstance(e, bool) for e in listed):
             raise ValueError(f"elbows must be joint numbers (integers), got {elbows!r}")

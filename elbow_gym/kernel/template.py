@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 from numba import njit
 
+from elbow_gym.kernel.disk_cache import stored
+
 Entry = Callable[..., Any]
 """A compiled function."""
 
@@ -62,7 +64,7 @@ def compiled(function: Any, *, cached: bool = False, inlined: bool = False, flat
         options["no_cpython_wrapper"] = True
         return njit(**options)(function)
     try:
-        return njit(cache=True, **options)(function)
+        return stored(njit(**options)(function))
     except RuntimeError:
         return njit(**options)(function)
 

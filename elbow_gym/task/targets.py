@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym.checks import restore
+from elbow_gym.checks import as_dict, require_entries
 from elbow_gym.kernel.rows import AHEAD, PHASE, TURN
 from elbow_gym.parameters import Array
 from elbow_gym.task.circle import Circle, as_phase
@@ -99,18 +99,23 @@ class Targets:
         return self._rate.copy()
 
     def get_state(self) -> dict[str, Any]:
-        """A copy of the paths, rates, phases and circles of all arms."""
-        own = {"path": self.path, "rate": self._rate, "phase": self._task[:, PHASE]}
-        return {**{name: array.copy() for name, array in own.items()}, "circles": list(self.circles)}
+        """The circles of all arms, from which paths, rates and phases follow."""
+        return {"circles": list(self.circles)}
 
-    def set_state(self, state: Mapping[str, Any]) -> None:
-        """Restores a state of `get_state`. Raises ValueError on another number of arms or of path rows."""
-        own = {"path": self.path, "rate": self._rate, "phase": self._task[:, PHASE]}
-        restore(own, state)
-        self._pace()
-        self.circles = list(state["circles"])
-        self._measure(range(len(self.circles)))
-        self._alike = bool((self.path == self.path[0]).all())
+    def checked(self, state: object, count: int) -> list[Circle]:
+        """The circles of `count` arms from a saved state. Raises ValueError where they are not drawn or do not fit."""
+        given = as_dict("state['targets']", state)
+        require_entries(given, ("circles",), "state['targets']")
+        circles = given["circles"]
+        if not isinstance(circles, list) or not all(
+            isinstance(one, Circle) and not one.drawn for one in cast("list[object]", circles)
+        ):
+            raise ValueError(f"state['targets']['circles'] must be a list of drawn circles, got {circles!r}")
+        drawn = cast("list[Circle]", circles)
+        if len(drawn) != count:
+            raise ValueError(f"state['targets']['circles'] must have {count} entries, got {len(drawn)}")
+        self.check(drawn)
+        return drawn
 
     def figures(self) -> dict[str, Array]:
         """Centre [m] (B, 3), radius [m], period [s], phase [rad] and signed rate [rad/s] of each circle, (B,)."""
