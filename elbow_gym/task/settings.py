@@ -15,6 +15,7 @@ from elbow_gym.parameters import ARM_SUFFIX, ArmParameters, Array, as_arm, as_el
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import quantities
 from elbow_gym.simulation.rates import Start, rates, worst_rows
+from elbow_gym.simulation.state_checks import check_angles
 from elbow_gym.simulation.step_limit import INTEGRATORS, check_option, check_timestep, schedule
 from elbow_gym.table import TableParameters, as_table
 from elbow_gym.task.circle import Circle, as_circle, check_reachable, extreme_points
@@ -103,6 +104,7 @@ class Settings:
     def parsed_arm(self) -> ArmParameters:
         """The arm that `arm` names."""
         arm = as_arm(self.arm)
+        check_angles("nominal_pose", np.array(arm.nominal_pose))
         if self.gear_coulomb_friction is None:
             return arm
         friction = non_negative("gear_coulomb_friction", self.gear_coulomb_friction)
