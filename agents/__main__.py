@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from agents.cli import Commands, Count, JsonObject, Seed
+from agents.task_options import TaskOptions
 
+TASK = TaskOptions()
 app = Commands("python -m agents", "Controllers of the arm: training, evaluation, pictures, the paper's results.")
 
 NOTHING: dict[str, object] = {}
@@ -54,52 +55,50 @@ def clone(words: Sequence[str]) -> Callable[..., None]:
 
 @app.command
 def publish(
-    runs: Annotated[tuple[Path, ...], Positional, arg(metavar="FOLDER [FOLDER ...]")], /, replace_seeds: bool = False
+    runs: Annotated[tuple[Path, ...], Positional, arg(metavar="FOLDER [FOLDER ...]")],
+    /,
+    replace_seeds: bool = False,
+    allow_worse: bool = False,
 ) -> None:
     """Takes finished runs over into the shipped policies and learning curves; a task's best seed is its baseline.
 
     Args:
         runs: Folders of the runs, as the training named them.
         replace_seeds: Whether to remove the shipped seeds of the same algorithm and task that are not among the runs.
+        allow_worse: Whether a shipped policy may give way to one with a worse return; otherwise that is refused.
     """
     from agents.learning.publish import publish as publish_runs
 
-    for name in publish_runs(runs, replace_seeds=replace_seeds):
+    for name in publish_runs(runs, replace_seeds=replace_seeds, allow_worse=allow_worse):
         print(name)
 
 
 @app.command
 def evaluate(
-    policy: Annotated[str, Positional, arg(metavar="POLICY")],
+    players: Annotated[tuple[str, ...], Positional, arg(metavar="WHAT [WHAT ...]")],
     /,
-    elbows: int | None = None,
-    env: str = "ElbowArm-v0",
+    task: OmitArgPrefixes[TaskOptions] = TASK,
     episodes: Count = 20,
+    trust: bool = False,
+    receipt: bool = False,
 ) -> None:
-    """Plays a controller in the regimes A, B and C and prints what it cost.
+    """Plays controllers in the regimes A, B and C and prints what they cost.
+
+    WHAT is a name of the registry ("pd", "computed_torque", "ppo"; a wrong one lists all), the folder of a training
+    run, a policy's file, a Stable-Baselines3 .zip, an .onnx file, or module:callable of a controller or of what makes
+    one for an environment; LABEL=WHAT gives it a name. Policies bring their environment.
 
     Args:
-        policy: Controller: "pd", "pd_paper", "pd_smooth", "pd_gravity", "computed_torque", "computed_torque_posture",
-            the algorithm of a shipped policy ("ppo"), or the path of a policy.
-        elbows: Number of elbows on the table; that of the environment, or of the policy's file, when None.
-        env: Gymnasium id of the environment; a policy's file brings its own.
+        players: Controllers.
+        task: Environment.
         episodes: Number of episodes, each with a start pose of its own from a fixed seed.
+        trust: Whether to read a .zip, whose pickles can run any code when they are read.
+        receipt: Whether to print, instead of a table, a line for `python -m agents verify`: settings, seeds, digest and
+            joules.
     """
-    from tqdm import tqdm
+    from agents.evaluation.command import evaluate_all
 
-    from agents.evaluation.players import find_player
-    from agents.evaluation.regimes import BENCHMARK_SEEDS, in_all_regimes, print_results
-
-    player = find_player(policy, elbows, env)
-    seeds = [BENCHMARK_SEEDS[0] + k for k in range(episodes)]
-    with tqdm(total=100, unit="%", desc=policy, file=sys.stderr) as bar:
-
-        def advance(done: int, total: int) -> None:
-            bar.update(100 * done // total - bar.n)
-
-        results = in_all_regimes(player, seeds, advance)
-    elbow_joints = player.settings.elbow_joints
-    print_results(f"{player.label}, elbows {elbow_joints}, {episodes} episodes: mean ± standard deviation", results)
+    evaluate_all(players, task, episodes, trust, receipt)
 
 
 @app.command
@@ -137,48 +136,103 @@ def bound(
 
 
 @app.command
-def report(output: Path = Path("report.html")) -> None:
+def verify(receipt: str, trust: bool = False) -> None:
+    """Plays the episodes of a receipt again and says how closely they agree: to the last bit, or to 1e-6 elsewhere.
+
+    Args:
+        receipt: Line of `python -m agents evaluate --receipt`, or a file that holds it.
+        trust: Whether to read a .zip, whose pickles can run any code when they are read.
+    """
+    from agents.evaluation.command import verify_receipt
+
+    verify_receipt(receipt, trust)
+
+
+@app.command
+def export(
+    policy: Annotated[str, Positional, arg(metavar="WHAT")],
+    output: Annotated[Path, Positional, arg(metavar="FILE.onnx")],
+    /,
+    task: OmitArgPrefixes[TaskOptions] = TASK,
+    trust: bool = False,
+) -> None:
+    """Writes a policy as an ONNX file, with its contract beside it, and checks that both act alike.
+
+    The contract, FILE.onnx.json, names the entries of the observation, their scales and limits, the action's unit, the
+    rate, the supply and the environment.
+
+    Args:
+        policy: Shipped algorithm such as "ppo", folder of a run, policy's file, or Stable-Baselines3 .zip.
+        output: File to write.
+        task: Environment of a .zip, and of the shipped policy that is meant.
+        trust: Whether to read a .zip, whose pickles can run any code when they are read.
+    """
+    from agents.learning.export import export as export_policy
+
+    print(export_policy(policy, output, task, trust))
+
+
+@app.command
+def report(
+    output: Path = Path("report.html"),
+    players: Annotated[UseAppendAction[tuple[str, ...]], arg(name="with", metavar="WHAT")] = (),
+    trust: bool = False,
+) -> None:
     """Writes one HTML page: replays of every controller, the paper's Figs 1-25 and the benchmark.
 
     Args:
         output: File of the page, which opens without a network.
+        players: Player of your own, as `python -m agents evaluate --help` says, beside the others; may be given several
+            times. Its numbers are of one episode without start noise.
+        trust: Whether to read a .zip, whose pickles can run any code when they are read.
     """
+    from agents.evaluation.guest import Guest
     from agents.report.command import report as write_report
 
-    write_report(output)
+    write_report(output, guests=[Guest.named(name, trust) for name in players])
 
 
 @app.command
 def watch(
-    controller: Annotated[str, Positional, arg(metavar="CONTROLLER")],
+    controller: Annotated[str, Positional, arg(metavar="WHAT")],
     /,
     versus: str | None = None,
-    elbows: int | None = None,
-    env: str = "ElbowArm-v0",
+    task: OmitArgPrefixes[TaskOptions] = TASK,
     start: Literal["paper", "on_target"] = "paper",
     seed: Seed = 0,
     speed: float = 1.0,
     size: tuple[int, int] = (640, 480),
     output: Path | None = None,
+    trust: bool = False,
 ) -> None:
     """Shows a controller at work in a window, in real time; without a display it writes a video instead.
 
     Args:
-        controller: Controller, by a name that `python -m agents evaluate --help` lists, or the path of a policy.
+        controller: Controller, as `python -m agents evaluate --help` says.
+        task: Environment.
         versus: Second controller, which is shown beside the first with the same start and in step.
-        elbows: Number of elbows on the table; that of the environment, or of the policy's file, when None.
-        env: Gymnasium id of the environment; a policy's file brings its own.
         start: Start pose: "paper" for the paper's, "on_target" for one whose hand is on the circle.
         seed: Seed of the start pose.
         speed: Simulated time per second of real time [s/s].
         size: Width and height of each controller's picture [pixels].
         output: File to write instead of opening a window, .gif or .mp4.
+        trust: Whether to read a .zip, whose pickles can run any code when they are read.
     """
     from agents.watch.watch import watch as watch_controllers
 
     names = [controller] if versus is None else [controller, versus]
     written = watch_controllers(
-        names, env=env, elbows=elbows, start=start, seed=seed, speed=speed, size=size, output=output
+        names,
+        env=task.env,
+        elbows=task.elbows,
+        arguments=task.arguments(),
+        trust=trust,
+        start=start,
+        seed=seed,
+        speed=speed,
+        size=size,
+        output=output,
+        tell=task.tell,
     )
     if written is not None:
         print(written)

@@ -8,11 +8,14 @@ import json
 import os
 import re
 import shlex
+import signal
 import sys
 import textwrap
-from collections.abc import Callable, Sequence
-from contextlib import redirect_stderr
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stderr
 from functools import partial
+from pathlib import PurePosixPath, PureWindowsPath
 from typing import Annotated, Any, NoReturn, get_type_hints
 
 import tyro
@@ -59,28 +62,32 @@ class Commands:
         self._summaries[named.__name__] = (named.__doc__ or "").strip().split("\n")[0]
 
     def run(self, words: Sequence[str] | None = None) -> None:
-        """Runs a command; an error of the user's making, or a missing extra, ends with one line on stderr.
+        """Runs a command; an error that the user or the system made, or a missing extra, ends with one line on stderr.
 
         Args:
             words: the command line after the program's name; that of this process when None.
 
         Raises:
-            SystemExit: 0 after help, 2 if the words cannot be parsed, 1 if the command refused what they say, or if
-                nobody reads the output to its end, as in `python -m agents --help | head -1`.
+            SystemExit: 0 after help, 2 if the words cannot be parsed, 1 if the command refused what they say, if the
+                system refused a file, or if nobody reads the output to its end, as in
+                `python -m agents --help | head -1`; 130 after Ctrl-C, 143 after SIGTERM, 129 after SIGHUP.
         """
-        try:
+        with _ending_signals() as ended:
             try:
-                self.parse(sys.argv[1:] if words is None else words)()
-            finally:
-                sys.stdout.flush()
-        except SystemExit:
-            raise
-        except BrokenPipeError:
-            if _has_reader():
+                try:
+                    self.parse(sys.argv[1:] if words is None else words)()
+                finally:
+                    sys.stdout.flush()
+            except SystemExit:
                 raise
-            sys.exit(1)
-        except _users_errors() as error:
-            sys.exit(f"error: {error}")
+            except KeyboardInterrupt:
+                sys.exit(128 + next(iter(ended), signal.SIGINT))
+            except BrokenPipeError:
+                if _has_reader():
+                    raise
+                sys.exit(1)
+            except _users_errors() as error:
+                sys.exit(f"error: {sentence(error)}")
 
     def parse(self, words: Sequence[str]) -> Callable[[], Any]:
         """The call that a command line asks for, not made yet.
@@ -136,14 +143,14 @@ def parse(function: Function, prog: str, words: Sequence[str]) -> Callable[[], A
 
 
 def spelled(package: str, command: str, words: Sequence[str]) -> str:
-    """The command line as a shell takes it, for the files that a command writes.
+    """The command line as a shell takes it, for files that a command writes; of a user's folders the last name alone.
 
     Args:
         package: what `python -m` runs.
         command: name of the command.
         words: the command line after it.
     """
-    return shlex.join(["python", "-m", package, command, *words])
+    return shlex.join(["python", "-m", package, command, *map(_without_folders, words)])
 
 
 def one_line(box: str) -> str:
@@ -168,6 +175,59 @@ def one_line(box: str) -> str:
     return "; ".join([reason, *more, *(f"known: {names}" for names in known)])
 
 
+@contextmanager
+def _ending_signals() -> Iterator[list[int]]:
+    """Has SIGTERM and SIGHUP end the block as Ctrl-C does, and yields a list for the one that came.
+
+    What a parent has set, such as `nohup`, stays.
+    """
+    came: list[int] = []
+
+    def end(number: int, _: Any) -> None:
+        came.append(number)
+        forget_lost_terminal()
+        raise KeyboardInterrupt
+
+    names = ("SIGTERM", "SIGHUP") if threading.current_thread() is threading.main_thread() else ()
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    taken = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
+    for number in taken:
+        signal.signal(number, end)
+    try:
+        yield came
+    finally:
+        for number in taken:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def forget_lost_terminal() -> None:
+    """Drops what is still said to a terminal that is gone, where every word would raise an error."""
+    for handle in (1, 2):
+        try:
+            os.write(handle, b"")
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, handle)
+            os.close(nowhere)
+
+
+def sentence(error: BaseException) -> str:
+    """An error's message; of the operating system's errors the reason and the file."""
+    if isinstance(error, OSError) and error.strerror is not None:
+        name = os.fsdecode(error.filename) if isinstance(error.filename, bytes) else error.filename
+        return error.strerror if name is None else f"{error.strerror}: {name}"
+    return str(error)
+
+
+def _without_folders(word: str) -> str:
+    option, equals, value = word.partition("=") if word.startswith("--") else ("", "", word)
+    for kind in (PurePosixPath, PureWindowsPath):
+        path = kind(value)
+        if path.is_absolute() or value.startswith("~") or ".." in path.parts:
+            return option + equals + path.name
+    return word
+
+
 def _refuse(reason: str) -> NoReturn:
     print(f"error: {reason}", file=sys.stderr)
     sys.exit(2)
@@ -190,7 +250,7 @@ def _users_errors() -> tuple[type[Exception], ...]:
     # Evaluated once something was raised: help needs no Gymnasium.
     from gymnasium.error import DependencyNotInstalled
 
-    return ValueError, DependencyNotInstalled
+    return ValueError, OSError, DependencyNotInstalled
 
 
 def _integer(rule: str, least: int) -> PrimitiveConstructorSpec[int]:

@@ -59,13 +59,26 @@ CONTROLLER_MARKERS = {
 }
 
 
+SPARE_COLOURS = ("#A6761D", "#7570B3", "#E7298A", "#66A61E")
+"""Colours of controllers that have none here; which is whose follows from their names."""
+
+
 def look(name: str) -> tuple[str, str, str]:
-    """A controller's name for readers, its colour #rrggbb and its marker; black and a disc where it has none here."""
+    """A controller's name for readers, its colour #rrggbb and its marker; a spare colour and a disc where it has none.
+
+    The name of a path is its last part.
+    """
+    spare = SPARE_COLOURS[sum(name.encode()) % len(SPARE_COLOURS)]
     return (
         CONTROLLER_NAMES.get(name, Path(name).name),
-        CONTROLLER_COLOURS.get(name, "#000000"),
+        CONTROLLER_COLOURS.get(name, spare),
         CONTROLLER_MARKERS.get(name, "o"),
     )
+
+
+def elbow_name(elbows: int) -> str:
+    """A number of elbows in words."""
+    return ELBOW_NAMES.get(elbows, f"{elbows} elbows")
 
 
 def pyplot() -> Any:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Annotated
 
-from agents.cli import Commands, Count, spelled
+from tyro.conf import UseAppendAction, arg
+
+from agents.cli import Commands, Count, JsonObject, spelled
 from agents.shipped import CURVES, OPTIMA
+from agents.task_options import Elbows, TaskOptions
 from benchmarks.machine import LATEST, LATEST_SPEED, RESULTS
 
 app = Commands("python -m benchmarks", "Benchmarks of energy, learning, the optimum and the simulator's speed.")
@@ -22,6 +26,11 @@ def energy(words: Sequence[str]) -> Callable[..., None]:
         fresh: bool = False,
         full: bool = False,
         publish: bool = False,
+        players: Annotated[UseAppendAction[tuple[str, ...]], arg(name="with", metavar="WHAT")] = (),
+        elbows: Elbows = None,
+        arm: Path | None = None,
+        environment: JsonObject | None = None,
+        trust: bool = False,
     ) -> None:
         """Energy and error of every controller with two, one and no elbow on the table, in the regimes A, B and C.
 
@@ -34,10 +43,19 @@ def energy(words: Sequence[str]) -> Callable[..., None]:
             fresh: Whether to measure everything again.
             full: Whether to play all parts, start poses and training seeds.
             publish: Whether to play everything and write the results to benchmarks/results and the READMEs' tables.
+            players: Player of your own, as `python -m agents evaluate --help` says, for a row beside the others; may be
+                given several times.
+            elbows: Elbows on the table, a number up to 2 or joint numbers such as 4,7; all of 2, 1 and 0 when None.
+            arm: JSON file of your own arm, on which the classical controllers and your players are compared.
+            environment: Further arguments of your own environment, such as '{"payload": 0.1}', in which the same play.
+            trust: Whether to read a .zip, whose pickles can run any code when they are read.
         """
-        from benchmarks.energy.run import energy as measure_energy
+        from benchmarks.energy.own import measure_own
 
-        measure_energy(output, episodes, fresh, full, publish, command=spelled("benchmarks", "energy", words))
+        measure_own(
+            TaskOptions(elbows=elbows, arm=arm, environment=environment or {}), players, trust, output=output,
+            episodes=episodes, fresh=fresh, full=full, publish=publish, command=spelled("benchmarks", "energy", words),
+        )  # fmt: skip
 
     return energy
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
-import os
 import sys
 import time
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from importlib.util import find_spec
@@ -16,15 +14,15 @@ from pathlib import Path
 from typing import Any
 
 from agents.control.trajectory import Trajectory
-from agents.files import write_csv, write_text
+from agents.files import check_writable, read_json, write_csv, write_text
+from agents.machine import machine, versions
 from agents.optimal.certificate import Optimum
 from agents.optimal.guesses import posture_guesses
 from agents.optimal.problem import Problem
 from agents.optimal.search import certified
 from agents.optimal.solution import SolveError
 from agents.shipped import OPTIMA
-from agents.workers import compile_before
-from benchmarks.machine import machine, versions
+from agents.workers import Pool, compile_before
 from elbow_gym.task.settings import Settings
 
 DEFAULT_WEIGHT = 0.001
@@ -96,7 +94,7 @@ def cached(cell: Cell, optima: Path = OPTIMA) -> dict[str, Any] | None:
     card, trajectory = files(cell, optima)
     if not (card.is_file() and trajectory.is_file()):
         return None
-    plain = json.loads(card.read_text(encoding="utf-8"))
+    plain = read_json(card)
     return plain["figures"] if plain["problem"] == cell.question else None
 
 
@@ -156,14 +154,10 @@ def run_cells(todo: Sequence[Cell], optima: Path, workers: int) -> dict[str, str
     from tqdm import tqdm
 
     failures: dict[str, str] = {}
-    context = multiprocessing.get_context("spawn")
-    # Small dense algebra: threads of two workers' BLAS would only get in each other's way.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
     if todo:
         # A solution is played by one arm; the LQR around it finds its gains with a batch.
         compile_before([(Settings(), 1), Settings()])
-    with tqdm(total=len(todo), file=sys.stderr, unit="cell") as bar, ProcessPoolExecutor(workers, context) as pool:
+    with tqdm(total=len(todo), file=sys.stderr, unit="cell") as bar, Pool(workers) as pool:
         # The front and what may go under the table start from the bound of their elbow count, so they wait for that.
         waiting = [cell for cell in todo if cell.parent in todo]
         running = {pool.submit(solve_cell, cell, optima): cell for cell in todo if cell not in waiting}
@@ -194,6 +188,8 @@ def optimal(output: Path, optima: Path, fresh: bool, workers: int, front: bool) 
     """
     if find_spec("casadi") is None:
         raise ValueError('casadi must be installed to solve, got none: pip install -e ".[optimal]"')
+    for place in (output, optima):
+        check_writable(place)
     started = time.monotonic()
     todo = [cell for cell in cells(front) if fresh or cached(cell, optima) is None]
     failures = run_cells(todo, optima, workers)

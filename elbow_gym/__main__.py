@@ -1,4 +1,4 @@
-"""The command line: `python -m elbow_gym compile`."""
+"""The command line: `python -m elbow_gym compile`, `verify` and `info`."""
 
 from __future__ import annotations
 
@@ -40,6 +40,22 @@ def compile_kernels(variants: list[str], sizes: list[str]) -> None:
     print(f"removed {removed} files of other sources")
 
 
+def run_verify() -> None:
+    """Checks the installation; exits with code 1 where something is wrong."""
+    from elbow_gym.verification import verify
+
+    if not verify():
+        raise SystemExit(1)
+
+
+def print_info() -> None:
+    """Prints the ids, arguments, observations and the cache's folder."""
+    from elbow_gym.description import describe
+    from elbow_gym.verification import ids
+
+    print(describe(ids()))
+
+
 def main(words: list[str] | None = None) -> None:
     """Parses a command line and carries it out."""
     parser = argparse.ArgumentParser(prog="python -m elbow_gym", description="Tools of an installation of elbow_gym.")
@@ -52,7 +68,14 @@ def main(words: list[str] | None = None) -> None:
     command.add_argument(
         "--size", choices=[*SIZES, "both"], default="both", help="for one or two arms, for larger batches, or both"
     )
+    for name, text in (
+        ("verify", "check the installation: a line for each check, exit code 1 where one fails"),
+        ("info", "print ids, arguments, the observation's entries and the cache's folder"),
+    ):
+        commands.add_parser(name, help=text, description=text)
     given = parser.parse_args(words)
+    if given.command != "compile":
+        return {"verify": run_verify, "info": print_info}[given.command]()
     unknown = [name for name in given.variants if name not in VARIANTS]
     if unknown:
         command.error(f"variant must be one of {', '.join(VARIANTS)}, got {unknown[0]}")

@@ -4,21 +4,48 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+SAVED_KINDS = {"f": "fiu", "i": "iu", "b": "b"}
+"""Kinds of numbers that a saved array may have, by the kind of the array that takes them."""
+LARGEST_INTEGER = 2**31
+"""Counts of arms, threads and control periods are at most this."""
+LONGEST_SHOWN = 10**20
 
 
 def finite(name: str, value: object) -> float:
     """The value as a float; ValueError naming `name` unless it is a finite number."""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise ValueError(f"{name} must be a number, got {value!r}")
-    number = float(value)
-    if not math.isfinite(number):
-        raise ValueError(f"{name} must be finite, got {value!r}")
-    return number
+    if not is_finite(value):
+        raise ValueError(f"{name} must be finite, got {shown(value)}")
+    return float(value)
+
+
+def is_finite(value: numbers.Real) -> bool:
+    """Whether float64 can represent a number; integers beyond 1e308 it cannot."""
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def shown(value: object) -> str:
+    """A value's text for a message; that of a long integer is shortened, where Python may refuse to write it."""
+    if isinstance(value, int) and abs(value) > LONGEST_SHOWN:
+        return "an integer of more than twenty digits"
+    return repr(value)
+
+
+def one_of(name: str, value: object, allowed: Sequence[str]) -> str:
+    """The value; ValueError naming `name` unless it is one of the strings."""
+    if not isinstance(value, str) or value not in allowed:
+        raise ValueError(f"{name} must be one of {allowed}, got {value!r}")
+    return value
 
 
 def positive(name: str, value: object) -> float:
@@ -50,14 +77,14 @@ def friction_coefficient(name: str, value: object) -> float:
 
 def positive_integer(name: str, value: object) -> int:
     """The value as an int; ValueError naming `name` unless it is a whole number of at least one."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
-        raise ValueError(f"{name} must be a positive integer, got {value!r}")
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not 1 <= int(value) <= LARGEST_INTEGER:
+        raise ValueError(f"{name} must be a positive integer, got {shown(value)}")
     return int(value)
 
 
 def check_entries(plain: Mapping[str, Any], allowed: set[str], owner: str) -> None:
     """ValueError naming `owner` and the first entry of `plain` that is not in `allowed`."""
-    unknown = sorted(set(plain) - allowed)
+    unknown = sorted(set(plain) - allowed, key=str)
     if unknown:
         raise ValueError(f"{owner} must have only the entries {sorted(allowed)}, got {unknown[0]!r}")
 
@@ -66,18 +93,27 @@ def require_entries(plain: Mapping[str, Any], required: Iterable[str], owner: st
     """ValueError naming `owner` and the first entry of `required` that is not in `plain`."""
     for name in required:
         if name not in plain:
-            raise ValueError(f"{owner} must have the entry {name!r}, got {sorted(plain)}")
+            raise ValueError(f"{owner} must have the entry {name!r}, got {sorted(map(str, plain))}")
+
+
+def real(value: Any) -> Any:
+    """The value. Raises TypeError for complex arrays, whose imaginary part NumPy would drop with a warning."""
+    kind: Any = getattr(value, "dtype", None)
+    if kind is not None and kind.kind == "c":
+        raise TypeError("complex")
+    return value
 
 
 def as_numbers(name: str, value: ArrayLike, *shapes: tuple[int, ...]) -> NDArray[np.float64]:
     """The value as a contiguous float64 array; ValueError naming `name` unless it is numbers of one of the shapes."""
     try:
-        array = np.asarray(value, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must be numbers of shape {_listed(shapes)}, got {value!r}") from error
+        array = np.asarray(real(value), dtype=np.float64, order="C")
+    except (OverflowError, TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be numbers of shape {_listed(shapes)}, got {shown(value)}") from error
     if array.shape not in shapes:
         raise ValueError(f"{name} must have shape {_listed(shapes)}, got {array.shape}")
-    return array
+    # Numba would compile the kernel again for arrays that cannot be written, or are not aligned.
+    return array if array.flags.behaved else array.copy()
 
 
 def as_batch(name: str, value: ArrayLike, shape: tuple[int, int]) -> NDArray[np.float64]:
@@ -92,16 +128,27 @@ def _listed(shapes: Iterable[tuple[int, ...]]) -> str:
     return " or ".join(map(str, shapes))
 
 
-def check_restorable(own: Mapping[str, NDArray[Any]], state: Mapping[str, Any]) -> None:
-    """ValueError naming the first array of `own` that `state` has not, or has in another shape."""
-    for name, array in own.items():
-        if name not in state or np.shape(state[name]) != array.shape:
-            got = np.shape(state[name]) if name in state else "nothing"
-            raise ValueError(f"state[{name!r}] must have shape {array.shape}, got {got}")
+def as_dict(name: str, value: object) -> Mapping[str, Any]:
+    """The value; ValueError naming `name` unless it is a dict or another mapping."""
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{name} must be a dict, got {value!r}")
+    return cast("Mapping[str, Any]", value)
 
 
-def restore(own: Mapping[str, NDArray[Any]], state: Mapping[str, Any]) -> None:
-    """Copies a saved state's arrays into `own`. Raises as `check_restorable`, with nothing changed."""
-    check_restorable(own, state)
-    for name, array in own.items():
-        array[...] = state[name]
+def saved_rows(name: str, value: ArrayLike, like: NDArray[Any], count: int) -> NDArray[Any]:
+    """A saved state's rows of `count` arms, as an array of the type and the rows' shape of `like`, (B, ...).
+
+    ValueError naming `name` unless they are finite numbers of that shape, whole ones or truths where `like` has such.
+    """
+    shape, kind = (count, *like.shape[1:]), like.dtype.kind
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name} must have shape {shape}, got {value!r}") from error
+    if array.shape != shape:
+        raise ValueError(f"{name} must have shape {shape}, got {array.shape}")
+    if array.dtype.kind not in SAVED_KINDS[kind]:
+        raise ValueError(f"{name} must have entries as {like.dtype}, got {array.dtype}")
+    if kind == "f" and not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
+    return array.astype(like.dtype)

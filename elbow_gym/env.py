@@ -12,13 +12,14 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from elbow_gym.checks import as_numbers, require_entries
+from elbow_gym.checks import as_numbers
 from elbow_gym.parameters import ArmParameters
 from elbow_gym.rendering.screen import can_draw
 from elbow_gym.rendering.viewer import RENDER_MODES, Viewer
 from elbow_gym.task.attributes import TaskAttributes, check_arguments
 from elbow_gym.task.episodes import Episodes
 from elbow_gym.task.infos import of_arm
+from elbow_gym.task.saved_state import checked_marks, number_of_arms
 from elbow_gym.task.settings import Settings
 
 
@@ -97,7 +98,7 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     | Argument | Default | Meaning |
     |----------|---------|---------|
     | elbows | 2 | 0, 1, 2 as in the paper (joints (), (4,), (4, 7)), or a tuple of joint numbers |
-    | arm | "paper" | preset name, an `ArmParameters`, or its JSON dict |
+    | arm | "paper" | preset name, path of a JSON file, an `ArmParameters`, or its JSON dict |
     | control_frequency | 50.0 | control periods, each with one action, per second [Hz] |
     | timestep | None | longest step of the integrator [s], refused where it is too long; None: chosen for accuracy |
     | integrator | "exponential" | Runge-Kutta of order 4 with exact decay of the currents, or "rk4" for the classical |
@@ -111,7 +112,7 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     | energy_weight | 0.001 | cost per watt of electrical power |
     | regeneration | True | whether negative electrical power is credited, and taken back by the supply |
     | table | False | a compliant table that cannot pull: True, or a dict of stiffness, dissipation, friction... |
-    | elbow_friction | 0.0 | Coulomb's coefficient of rigid elbows, where they push |
+    | elbow_friction | 0.0 | Coulomb's coefficient of rigid elbows, where they push; at most 1 |
     | gear_coulomb_friction | None | Coulomb friction of every gear at the motor shaft [N m] |
     | heat | False | whether windings warm up and their resistance grows |
     | supply_resistance | 0.0 | resistance inside the motors' common supply [ohm] |
@@ -169,7 +170,7 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         super().reset(seed=int(seed) if isinstance(seed, numbers.Integral) else seed)
         try:
             self._episodes.reset([self.np_random], options=options)
-        except ValueError:
+        except BaseException:
             self._np_random, self._np_random_seed = before
             raise
         self._ready = True
@@ -206,13 +207,26 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         self._viewer.close()
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that changes from step to step, the random generator included."""
-        return {"episodes": self._episodes.get_state(), "generator": copy.deepcopy(self.np_random.bit_generator.state)}
+        """Everything that changes from step to step, the random generator included, as of a batch of one arm."""
+        return {
+            "episodes": self._episodes.get_state(),
+            "generators": [copy.deepcopy(self.np_random.bit_generator.state)],
+            "over": np.zeros(1, dtype=np.bool_),
+            "started": np.array([self._ready]),
+        }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Restores a state of `get_state`; the run goes on bit for bit."""
-        require_entries(state, ("episodes", "generator"), "state")
-        self._episodes.set_state(state["episodes"], [self.np_random])
-        self.np_random.bit_generator.state = state["generator"]
-        self._ready = True
+        """Restores a state of `get_state`, or of one arm of a batch; the run goes on bit for bit.
+
+        The settings must be those that the state was made with, but for weights, start, circle, duration and ranges.
+        Raises ValueError naming what is wrong with a state, with everything as it was.
+        """
+        count = number_of_arms(state)
+        if count != 1:
+            raise ValueError(f"state must be of one arm, got one of {count}")
+        saved = self._episodes.checked(state["episodes"], 1)
+        marks = checked_marks(state, [self.np_random])
+        self._episodes.put(np.arange(1), saved, [self.np_random])
+        self.np_random.bit_generator.state = marks.generators[0]
+        self._ready = bool(marks.started[0])
         self._viewer.restart()

@@ -13,6 +13,10 @@ from numpy.typing import ArrayLike
 
 from elbow_gym.parameters import ArmParameters, Array
 
+NEWTON_ROUNDS = 50
+NEWTON_TOLERANCE = 1e-12
+"""Height at which an elbow counts as on the table [m]."""
+
 
 def pitches(q: ArrayLike) -> Array:
     """Absolute pitch phi [rad] from the vertical, shape (..., n): zero for link 1, cumulative after it."""
@@ -50,6 +54,22 @@ def constraint_jacobian(arm: ArmParameters, q: ArrayLike, elbows: Sequence[int])
     for row, elbow in enumerate(elbows):
         jacobian[..., row, 1 : elbow - 1] = np.cumsum(slope[..., 1 : elbow - 1][..., ::-1], axis=-1)[..., ::-1]
     return jacobian
+
+
+def on_table(arm: ArmParameters, q: ArrayLike, elbows: Sequence[int]) -> Array:
+    """The pose with the elbows at z = 0 [rad], shape (n,), that Newton's method finds from a pose; C(q) = 0 of eq. 18.
+
+    Raises:
+        ValueError: it finds none, since the links are too short or the pose is singular.
+    """
+    q = np.array(q, dtype=np.float64)
+    height = elbow_heights(arm, q, elbows)
+    for _ in range(NEWTON_ROUNDS):
+        if np.abs(height).max(initial=0.0) < NEWTON_TOLERANCE:
+            return q
+        q = q - np.linalg.pinv(constraint_jacobian(arm, q, elbows)) @ height
+        height = elbow_heights(arm, q, elbows)
+    raise ValueError(f"elbows must be able to lie on the table, got heights {height} m after {NEWTON_ROUNDS} rounds")
 
 
 def radii(arm: ArmParameters, q: ArrayLike, joints: Sequence[int]) -> Array:

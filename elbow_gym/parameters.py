@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -166,15 +168,27 @@ def paper_arm() -> ArmParameters:
 
 
 PRESETS = {"paper": paper_arm}
+ARM_SUFFIX = ".json"
+"""Suffix of a name that is no preset's but an arm's file."""
+
+
+def read_arm(path: Path) -> ArmParameters:
+    """The arm in a JSON file of `ArmParameters.to_dict`. Raises ValueError naming the file, and what is wrong in it."""
+    try:
+        return as_arm(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError) as error:
+        raise ValueError(f"arm must be a JSON file of an arm, got {path}: {error}") from error
 
 
 def as_arm(arm: object) -> ArmParameters:
-    """An arm from a preset name, a dict of `ArmParameters.to_dict`, or an ArmParameters."""
+    """An arm from a preset name, the path of a .json file, a dict of `ArmParameters.to_dict`, or an ArmParameters."""
     if isinstance(arm, ArmParameters):
         return arm
     if isinstance(arm, str):
+        if arm.endswith(ARM_SUFFIX):
+            return read_arm(Path(arm))
         if arm not in PRESETS:
-            raise ValueError(f"arm must be one of {sorted(PRESETS)}, got {arm!r}")
+            raise ValueError(f"arm must be one of {sorted(PRESETS)} or a {ARM_SUFFIX} file, got {arm!r}")
         return PRESETS[arm]()
     if isinstance(arm, Mapping):
         return ArmParameters.from_dict(cast("Mapping[str, Any]", arm))
@@ -191,7 +205,7 @@ def as_elbows(elbows: object, n_joints: int) -> tuple[int, ...]:
         if int(elbows) not in paper:
             raise ValueError(f"elbows must be 0, 1, 2 or a tuple of joint numbers, got {elbows!r}")
         joints = paper[int(elbows)]
-    elif isinstance(elbows, list | tuple | np.ndarray):
+    elif isinstance(elbows, list | tuple) or (isinstance(elbows, np.ndarray) and elbows.ndim == 1):
         listed = cast("Sequence[object]", elbows)
         if not all(isinstance(e, numbers.Integral) and not isinstance(e, bool) for e in listed):
             raise ValueError(f"elbows must be joint numbers (integers), got {elbows!r}")

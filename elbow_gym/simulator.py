@@ -8,30 +8,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from elbow_gym.checks import as_batch, positive, positive_integer, restore
+from elbow_gym.checks import as_batch, positive, positive_integer
+from elbow_gym.kernel import observe
 from elbow_gym.kernel.build import announced, kernel
 from elbow_gym.kernel.rows import (
     LARGEST_ANGLE,
     MAXIMUM_ELBOWS,
+    PERIODS,
     STATE_ROWS,
     SUMMARY_COLUMNS,
     SWITCHED_STATE,
     SWITCHED_STATE_ROWS,
+    TIMESTEPS,
     VALID,
 )
 from elbow_gym.kernel.slots import BLOCK_LANES
-from elbow_gym.kinematics import elbow_heights, pitches
+from elbow_gym.kinematics import elbow_heights
 from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
 from elbow_gym.simulation.options import Conditions, as_conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.simulation.rates import rates
+from elbow_gym.simulation.state_checks import PLANE_TOLERANCE, check_angles, check_on_table, checked_arrays
 from elbow_gym.simulation.state_views import Readings
 from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep
 from elbow_gym.simulation.thread_pool import Sharing
+from elbow_gym.simulation.writable import take_over
 
-# A given pose may be off the elbows' plane by this much [m], its rates by this much [m/s].
-PLANE_TOLERANCE = 1e-8
-RATE_TOLERANCE = 1e-6
+# Parts that a step is divided into where whole steps lead to a state that cannot be represented.
+FINER = (8, 64)
 
 
 class Simulator(Readings):
@@ -92,6 +96,7 @@ class Simulator(Readings):
         """Length of a control period [s], by which `control_step` moves the clock."""
         self._attach()
         self._nominal = as_batch("nominal_pose", self.arm.nominal_pose, (self.num_envs, n))
+        check_angles("nominal_pose", self._nominal)
         if self.elbows and np.abs(elbow_heights(self.arm, self.arm.nominal_pose, self.elbows)).max() > PLANE_TOLERANCE:
             self._nominal = self.on_table(self.arm.nominal_pose)
         self.reset()
@@ -109,6 +114,7 @@ class Simulator(Readings):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+        take_over(self)
         self._attach()
 
     def reset(
@@ -141,7 +147,7 @@ class Simulator(Readings):
         valid = self._summary[:, VALID].copy()
         self._summary[chosen] = 0.0
         self._clock[chosen] = 0
-        self._share("refresh", self._state, self._parameters, self._elbow_index, self._summary)
+        self.advance(np.zeros((self.num_envs, self.arm.n_joints)), np.zeros(0))
         # A new summary of the other arms' last state does not make it the outcome of their last step.
         self._summary[~chosen, VALID] = valid[~chosen]
 
@@ -164,7 +170,7 @@ class Simulator(Readings):
                 self._kernel.project_poses(settled, self._parameters, self._elbow_index)
             if not (np.abs(settled).max() < LARGEST_ANGLE):
                 raise ValueError(f"q must be near a pose with the elbows {self.elbows} at z = 0, got {q!r}")
-            self._check_on_table(settled, np.zeros_like(settled), self._parameters[:, 0])
+            check_on_table(self.elbows, settled, np.zeros_like(settled), self._parameters[:, 0])
         return settled
 
     def check_state(
@@ -187,23 +193,10 @@ class Simulator(Readings):
         chosen = np.ones(self.num_envs, dtype=np.bool_) if mask is None else np.asarray(mask, dtype=np.bool_)
         if chosen.shape != (self.num_envs,):
             raise ValueError(f"mask must have shape {(self.num_envs,)}, got {chosen.shape}")
-        if np.abs(q).max() >= LARGEST_ANGLE:
-            raise ValueError(f"q must be within {LARGEST_ANGLE:g} rad, got {np.abs(q).max():g}")
+        check_angles("q", q)
         if self.elbows:
-            self._check_on_table(q[chosen], q_dot[chosen], self._parameters[chosen, 0])
+            check_on_table(self.elbows, q[chosen], q_dot[chosen], self._parameters[chosen, 0])
         return q, q_dot, current, rise, chosen
-
-    def _check_on_table(self, q: Array, q_dot: Array, length: Array) -> None:
-        joints = [elbow - 2 for elbow in self.elbows]
-        height = np.abs(np.cumsum(length * np.cos(pitches(q)), axis=-1)[:, joints])
-        if height.size and height.max() > PLANE_TOLERANCE:
-            joint = self.elbows[int(height.max(axis=0).argmax())]
-            raise ValueError(
-                f"q must hold elbow joint {joint} at z = 0 to {PLANE_TOLERANCE:g} m, got {height.max():.6g} m off"
-            )
-        rise = np.abs(np.cumsum(length * np.sin(pitches(q)) * pitches(q_dot), axis=-1)[:, joints])
-        if rise.size and rise.max() > RATE_TOLERANCE:
-            raise ValueError(f"q_dot must keep the elbows at z = 0, got {rise.max():.6g} m/s off the table")
 
     def step(self, voltage: ArrayLike, n_substeps: int = 1) -> None:
         """Advances every arm by n_substeps timesteps under constant terminal voltages [V], (B, n) or (n,).
@@ -214,7 +207,7 @@ class Simulator(Readings):
         voltage = as_batch("voltage", voltage, (self.num_envs, self.arm.n_joints))
         count = positive_integer("n_substeps", n_substeps)
         self.advance(np.array(voltage, order="C"), np.full(count, self.timestep))
-        self._clock[:, 0] += count
+        self._clock[:, TIMESTEPS] += count
 
     def advance(self, voltage: Array, steps: Array) -> None:
         """Advances every arm through steps of given lengths [s] under constant voltages, without checks or clock.
@@ -223,54 +216,85 @@ class Simulator(Readings):
         """
         self._share("advance", self._state, self._parameters, voltage, self._elbow_index, steps, self._summary)
 
-    def control_step(self, actions: tuple[Any, ...], steps: Array, observed: tuple[Any, ...]) -> int:
+    def control_step(self, actions: tuple[Array, ...], steps: Array, task: tuple[NDArray[Any], ...]) -> int:
         """One control period of every arm, from actions to observations and rewards.
 
         Args:
             actions: the arguments of the kernel's `control_step` before the state.
             steps: lengths of the steps [s].
-            observed: its arguments behind the summary.
+            task: its arguments behind the clock.
 
         Returns:
-            The number of arms that are not `valid`; a negative one, with nothing changed, where an action is NaN.
+            The number of arms that are not `valid`, in finer steps neither; a negative one, with nothing changed, where
+            an action is NaN.
         """
         # One share checks its own actions before it moves; several must not move before all are checked.
         if self._num_threads > 1 and np.isnan(actions[0]).any():
             return -1
-        own = (self._state, self._parameters, self._elbow_index, steps, self._summary)
-        invalid = self._share("control_step", *actions, *own, *observed)
-        if invalid >= 0:
-            self._clock[:, 1] += 1
-        return invalid
+        own = (self._state, self._parameters, self._elbow_index, steps, self._summary, self._clock)
+        invalid = self._share("control_step", *actions, *own, *task)
+        return self._taken_again(actions[1], steps, task) if invalid > 0 else invalid
+
+    def _taken_again(self, voltage: Array, steps: Array, task: tuple[NDArray[Any], ...]) -> int:
+        """Takes arms that steps made unrepresentable, and which are where they were, through finer ones.
+
+        Elbows that for an instant can hardly move against each other need them. Returns the number of arms that are
+        not `valid` after that.
+        """
+        for share in FINER:
+            finer = np.repeat(steps / share, share)
+            for arm in np.flatnonzero(~self.valid):
+                one = (int(arm), int(arm) + 1)
+                moved = (self._state, self._parameters, voltage, self._elbow_index, finer, self._summary)
+                if not self._kernel.advance(*moved, *one):
+                    observe.observe(self._state, self._summary, self._clock, *task, *one)
+        return int((~self.valid).sum())
 
     @property
-    def raw(self) -> tuple[Array, Array]:
-        """The kernel's own state and summary arrays, for functions that only read them."""
-        return self._state, self._summary
+    def raw(self) -> tuple[Array, Array, NDArray[np.int64]]:
+        """The kernel's own state, summary and clock arrays, for functions that only read them."""
+        return self._state, self._summary, self._clock
 
     def _share(self, name: str, *arguments: Any) -> int:
         """Calls an entry of the kernel for every thread's share of the arms; the sum of what they return."""
         entry = getattr(self._kernel, name)
-
-        def work(first: int, end: int) -> int:
-            return entry(*arguments, first, end) or 0
-
         if name in self._called:
-            return self._sharing.total(work)
+            return self._sharing.total(entry, *arguments)
         with announced():
-            total = self._sharing.total(work)
+            total = self._sharing.total(entry, *arguments)
         self._called.add(name)
         return total
 
+    def close(self) -> None:
+        """Ends the threads. May be called twice; what steps afterwards starts them again."""
+        self._sharing.close()
+
     def get_state(self) -> dict[str, NDArray[Any]]:
         """A copy of the state, summary and clock; `set_state` continues from it bit for bit."""
-        return {"state": self._state.copy(), "summary": self._summary.copy(), "clock": self._clock.copy()}
+        return {name: array.copy() for name, array in self._own().items()}
+
+    def _own(self) -> dict[str, NDArray[Any]]:
+        return {"state": self._state, "summary": self._summary, "clock": self._clock}
 
     def set_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Restores a state of `get_state` of a simulator of the same size. Raises ValueError on another size."""
-        restore({"state": self._state, "summary": self._summary, "clock": self._clock}, state)
+        """Restores a state of an equal simulator. Raises ValueError as `checked_arrays`, with nothing changed."""
+        self.put(np.arange(self.num_envs), self.checked(state, self._parameters[:, 0]))
+
+    def checked(self, state: object, length: Array) -> dict[str, NDArray[Any]]:
+        """The arrays of a saved state of arms with the lengths [m], (k, n), by name. Raises as `set_state`."""
+        return checked_arrays(self._own(), state, self.elbows, length)
+
+    def put(self, chosen: NDArray[np.int64], saved: Mapping[str, NDArray[Any]]) -> None:
+        """Gives the chosen arms, (k,), states that `checked` has passed, of k arms or of one for all."""
+        for name, array in self._own().items():
+            array[chosen] = saved[name]
 
     @property
     def time(self) -> Array:
         """Time since the reset [s], (B,)."""
-        return self._clock[:, 0] * self.timestep + self._clock[:, 1] * self.period
+        return self._clock[:, TIMESTEPS] * self.timestep + self.periods * self.period
+
+    @property
+    def periods(self) -> NDArray[np.int64]:
+        """Control periods since the reset, (B,)."""
+        return self._clock[:, PERIODS]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import numbers
 import operator
 from collections.abc import Mapping, Sequence
@@ -12,16 +13,18 @@ import numpy as np
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from elbow_gym.checks import as_numbers, positive_integer, require_entries
+from elbow_gym.checks import as_dict, as_numbers, one_of, positive_integer
 from elbow_gym.env import ElbowArmEnv, action_space, observation_space
 from elbow_gym.parameters import ArmParameters
 from elbow_gym.rendering.viewer import Viewer
+from elbow_gym.simulation.writable import take_over
 from elbow_gym.task.arm_access import ask, assign
 from elbow_gym.task.attributes import TaskAttributes, check_arguments
 from elbow_gym.task.episodes import Episodes, Outcome
 from elbow_gym.task.infos import Flags, masked, only, restarted
+from elbow_gym.task.saved_state import as_arms, checked_marks, number_of_arms
 from elbow_gym.task.settings import Settings
 
 
@@ -60,8 +63,8 @@ class ElbowArmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     ) -> None:
         check_arguments(settings, ElbowArmVectorEnv.__init__)
         modes = [mode.value for mode in AutoresetMode]
-        if autoreset_mode not in [*AutoresetMode, *modes]:
-            raise ValueError(f"autoreset_mode must be one of {modes}, got {autoreset_mode!r}")
+        if not isinstance(autoreset_mode, AutoresetMode):
+            one_of("autoreset_mode", autoreset_mode, modes)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         unlimited = max_episode_steps is None or max_episode_steps == -1
         longest = None if unlimited else positive_integer("max_episode_steps", max_episode_steps)
@@ -123,9 +126,13 @@ class ElbowArmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         given = options.get("reset_mask")
         if given is None:
             return np.ones(self.num_envs, dtype=np.bool_)
-        mask: NDArray[Any] = np.asarray(given)
+        rule = f"options['reset_mask'] must be a bool array of shape {(self.num_envs,)}, got {given!r}"
+        try:
+            mask: NDArray[Any] = np.asarray(given)
+        except ValueError as error:
+            raise ValueError(rule) from error
         if mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise ValueError(f"options['reset_mask'] must be a bool array of shape {(self.num_envs,)}, got {given!r}")
+            raise ValueError(rule)
         if not mask.any():
             raise ValueError(f"options['reset_mask'] must choose at least one arm, got {given!r}")
         return mask
@@ -137,14 +144,14 @@ class ElbowArmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
         Raises ValueError naming a wrong option, with everything as it was.
         """
-        options = {} if options is None else options
-        chosen = self._reset_mask(options)
+        given: Mapping[str, Any] = {} if options is None else as_dict("options", options)
+        chosen = self._reset_mask(given)
         before = list(self._generators), list(self._seeds)
         try:
             self._seed(seed, chosen)
-            rest = {key: value for key, value in options.items() if key != "reset_mask"}
+            rest = {key: value for key, value in given.items() if key != "reset_mask"}
             self._episodes.reset(self._generators, chosen, rest)
-        except (ValueError, gym.error.Error):
+        except BaseException:
             self._generators, self._seeds = before
             raise
         self._over[chosen] = False
@@ -212,10 +219,11 @@ class ElbowArmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         return self._viewer.render(bool(self._started.all()))
 
     def close_extras(self, **_kwargs: Any) -> None:
-        """Closes the window, if there is one."""
+        """Closes the window, if there is one, and ends the threads; a later step starts them again."""
         # Gymnasium 1.2 closes what is collected, even if its construction has failed.
         if hasattr(self, "_viewer"):
             self._viewer.close()
+            self._episodes.simulator.close()
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """An attribute of every arm, or a method's answer, as `SyncVectorEnv` has it; the method is called once."""
@@ -233,23 +241,45 @@ class ElbowArmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         """
         assign(self, name, values)
 
-    def get_state(self) -> dict[str, Any]:
-        """Everything that changes from step to step, the random generators included."""
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        take_over(self)
+
+    def get_state(self, arms: ArrayLike | None = None) -> dict[str, Any]:
+        """Everything that changes from step to step, the random generators included.
+
+        Args:
+            arms: numbers of arms, or a mask (B,); all when None.
+        """
+        chosen = np.arange(self.num_envs) if arms is None else as_arms(arms, self.num_envs)
+        generators = self.np_random
         return {
-            "episodes": self._episodes.get_state(),
-            "generators": [generator.bit_generator.state for generator in self.np_random],
-            "over": self._over.copy(),
-            "started": self._started.copy(),
+            "episodes": self._episodes.get_state(chosen),
+            "generators": [generators[i].bit_generator.state for i in chosen],
+            "over": self._over[chosen],
+            "started": self._started[chosen],
         }
 
-    def set_state(self, state: Mapping[str, Any]) -> None:
-        """Restores a state of `get_state`; the run goes on bit for bit."""
-        require_entries(state, ("episodes", "generators", "over", "started"), "state")
-        if len(state["generators"]) != self.num_envs:
-            raise ValueError(f"state['generators'] must have {self.num_envs} entries, got {len(state['generators'])}")
-        self._episodes.set_state(state["episodes"], self.np_random)
-        for generator, saved in zip(self.np_random, state["generators"], strict=True):
-            generator.bit_generator.state = saved
-        self._over = np.array(state["over"], dtype=np.bool_)
-        self._started = np.array(state["started"], dtype=np.bool_)
-        self._viewer.restart()
+    def set_state(self, state: Mapping[str, Any], arms: ArrayLike | None = None) -> None:
+        """Restores a state of `get_state`; the run goes on bit for bit.
+
+        The settings must be those that the state was made with, but for weights, start, circle, duration and ranges.
+        Raises ValueError naming what is wrong with a state, with everything as it was.
+
+        Args:
+            state: of this environment, or of another one with other arms or a single arm.
+            arms: numbers of the arms, or a mask (B,), that take it: as many as it has, or any number for a state of
+                one arm, which then goes on in all of them, each with a generator in the same state; all when None.
+        """
+        count = number_of_arms(state)
+        chosen = np.arange(self.num_envs) if arms is None else as_arms(arms, self.num_envs)
+        if count != len(chosen) and (count != 1 or arms is None):
+            raise ValueError(f"state must be of {len(chosen)} arms, got one of {count}")
+        generators = [self.np_random[i] for i in chosen]
+        saved = self._episodes.checked(state["episodes"], count)
+        marks = checked_marks(state, generators)
+        self._episodes.put(chosen, saved, generators)
+        for generator, mark in zip(generators, itertools.cycle(marks.generators), strict=False):
+            generator.bit_generator.state = mark
+        self._over[chosen], self._started[chosen] = marks.over, marks.started
+        self._viewer.restart(None if arms is None else np.isin(np.arange(self.num_envs), chosen))

@@ -1,15 +1,18 @@
 """Makes the golden traces and the golden picture: `python tests/make_golden.py`.
 
-The one script that writes tests/golden/. A trace that changes is a change of the physics as users see it and
-needs a line in CHANGELOG.md that says why; so does a picture that looks different.
+The one script that writes tests/golden/ and elbow_gym/golden.json. A trace that changes is a change of the
+physics as users see it and needs a line in CHANGELOG.md that says why; so does a picture that looks different.
 """
 
+import json
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
 from elbow_gym import ElbowArmEnv, Simulator
+from elbow_gym.verification import GOLDEN as HASHES
+from elbow_gym.verification import ROLLOUTS, rollout
 
 GOLDEN = Path(__file__).parent / "golden"
 ELBOWS = (0, 1, 2)
@@ -40,6 +43,8 @@ def main():
     GOLDEN.mkdir(exist_ok=True)
     for elbows in ELBOWS:
         np.savez_compressed(GOLDEN / f"elbows_{elbows}.npz", **trace(elbows))
+    hashes = {name: rollout(arguments) for name, arguments in ROLLOUTS.items()}
+    HASHES.write_text(json.dumps(hashes, indent=2) + "\n")
     Image.fromarray(picture()).save(GOLDEN / "picture.png", optimize=True)
     print(f"Wrote {len(ELBOWS)} traces and a picture to {GOLDEN}. If one changed, say why in CHANGELOG.md.")
 

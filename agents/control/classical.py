@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.minimum_jerk import minimum_jerk
-from agents.control.posture import best_postures
+from agents.control.posture import best_postures, leads_to
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
 from elbow_gym.checks import positive
 from elbow_gym.interface import Environment, Interface
-from elbow_gym.kinematics import HandPlacement
+from elbow_gym.kinematics import HandPlacement, on_table
 from elbow_gym.parameters import ArmParameters
 from elbow_gym.task.circle import Circle
 
@@ -154,8 +154,12 @@ class ComputedTorque(_Following):
 
 @cache
 def economical_pose(arm: ArmParameters, elbows: tuple[int, ...], circle: Circle) -> Array:
-    """The pose [rad], (n,), whose idle joints hold the arm over the circle with least copper loss, none below z = 0."""
-    return best_postures(arm, elbows, circle)[0].pose
+    """The pose [rad], (n,), whose idle joints hold the arm over the circle with least copper loss, none below z = 0.
+
+    Only poses count that the arm can move to with its elbows on the table; the start pose where none is found.
+    """
+    found = [posture.pose for posture in best_postures(arm, elbows, circle) if leads_to(arm, elbows, posture.pose)]
+    return found[0] if found else on_table(arm, arm.nominal_pose, elbows)
 
 
 def economical_computed_torque(env: Environment) -> ComputedTorque:

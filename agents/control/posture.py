@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.control.inverse_dynamics import InverseDynamics
-from elbow_gym.kinematics import inverse_kinematics, pitches
+from elbow_gym.kinematics import constraint_jacobian, inverse_kinematics, on_table, pitches
 from elbow_gym.parameters import ArmParameters
 from elbow_gym.task.circle import Circle
 
@@ -24,6 +24,12 @@ BEND = 0.2
 """Least bend of the last joint [rad]: stretched, the hand could not follow both ways."""
 LARGEST = np.pi
 """Bound of every angle [rad]."""
+WAY_STEPS = 200
+"""Steps of the way from the start pose to a posture."""
+LEAST_LEVER = 0.02
+"""Height that elbows gain by a turn of the joints, over the longest link, below which they count as stuck [1/rad]."""
+ARRIVED = 1e-3
+"""Largest difference of an angle at the end of the way [rad]."""
 NUDGE = 2.0**-26
 """Step of the forward differences [rad], SciPy's own."""
 
@@ -135,6 +141,23 @@ def best_postures(
             f"circle must allow a posture with the elbows {tuple(elbows)} down, got none in {starts} searches"
         )
     return sorted(found, key=lambda posture: posture.copper_loss)
+
+
+def leads_to(arm: ArmParameters, elbows: Sequence[int], pose: Array) -> bool:
+    """Whether the straight way from the start pose to a pose [rad], (n,), bent onto the elbows' plane, arrives there.
+
+    Elbows that fold over to the other side would pass through a pose in which they cannot move up or down.
+    """
+    q = on_table(arm, arm.nominal_pose, elbows)
+    for left in range(WAY_STEPS, 0, -1):
+        try:
+            q = on_table(arm, q + (pose - q) / left, elbows)
+        except ValueError:
+            return False
+        lever = np.linalg.svd(constraint_jacobian(arm, q, elbows), compute_uv=False).min(initial=np.inf)
+        if lever < LEAST_LEVER * arm.of_links("length").max():
+            return False
+    return bool(np.abs(q - pose).max() < ARRIVED)
 
 
 def _condition(kind: str, function: Callable[[Array], Array]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.files import write_whole
+from agents.files import read_arrays, write_whole
 from elbow_gym.interface import Environment, Interface
 
 Array = NDArray[np.float64]
@@ -35,9 +35,19 @@ class Trajectory:
 
     @classmethod
     def load(cls, path: Path) -> Trajectory:
-        """Reads what `save` wrote."""
-        with np.load(path, allow_pickle=False) as arrays:
-            return cls(**{field.name: arrays[field.name] for field in fields(cls)})
+        """Reads what `save` wrote. ValueError naming the file when it is cut, altered or holds what is not finite."""
+        arrays = read_arrays(path)
+        names = [field.name for field in fields(cls)]
+        if set(arrays) != set(names):
+            raise ValueError(f"{path} must hold the arrays {names}, got {sorted(arrays)}")
+        periods, joints = arrays["voltage"].shape if arrays["voltage"].ndim == 2 else (0, 0)
+        for name, array in arrays.items():
+            shape = (periods, joints) if name == "voltage" else (periods + 1, joints)
+            if array.shape != shape or array.dtype.kind != "f":
+                raise ValueError(f"{name} in {path} must be numbers of shape {shape}, got {array.dtype} {array.shape}")
+            if not np.isfinite(array).all():
+                raise ValueError(f"{name} in {path} must be finite, got {array[~np.isfinite(array)][0]}")
+        return cls(**arrays)
 
 
 class OpenLoop:

@@ -46,6 +46,7 @@ UNITS = {
     "peak_current": "A",
     "smallest_elbow_force": "N",
     "below_table": "s",
+    "voltage_change": "V",
     "return": "-",
 }
 
@@ -78,6 +79,7 @@ def metrics(recording: Recording, since: float = 0.0) -> dict[str, Array]:
         "peak_current": np.abs(recording.current[k:]).max(axis=(0, 2)),
         "smallest_elbow_force": force.min(axis=(0, 2)) if force.shape[2] else np.full(force.shape[1], np.nan),
         "below_table": recording.below_table[-1] - recording.below_table[k],
+        "voltage_change": _voltage_change(recording, k),
         "return": _return(recording, k),
     }
 
@@ -93,6 +95,15 @@ def _on_grid(recording: Recording, k: int) -> tuple[NDArray[np.int64], Array]:
     stride = max(1, round(RETURN_PERIOD / recording.time[1]))
     grid = np.arange(k, recording.time.size, stride)
     return grid, np.linalg.norm(recording.hand[grid[1:]] - recording.target[grid[1:]], axis=-1)
+
+
+def _voltage_change(recording: Recording, k: int) -> Array:
+    """Smoothness of control: root mean square change of the terminal voltages over `RETURN_PERIOD` [V], (B,)."""
+    # Before the first decision there is no voltage to change.
+    voltage = recording.voltage[_on_grid(recording, k)[0][1:]]
+    if len(voltage) < 2:
+        return np.zeros(voltage.shape[1])
+    return np.sqrt((np.diff(voltage, axis=0) ** 2).mean(axis=(0, 2)))
 
 
 def _return(recording: Recording, k: int) -> Array:

@@ -3,33 +3,28 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from agents.control.classical import COMPUTED, ComputedTorque, GravityPD, SmoothPD, economical_computed_torque
-from agents.control.controller import Controller
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import Trajectory
+from agents.evaluation.own import KINDS, labelled, own_player, python_player, relabelled
+from agents.evaluation.player import TABLE, Maker, Player, player_of, policy_player
 from agents.shipped import OPTIMA
 from agents.shipped.seeds import load_policy, shipped_path, shipped_policies, shipped_seeds
-from agents.style import look
-from agents.tasks import POLICY_NAME, task_settings
+from agents.tasks import POLICY_NAME, Elbows, task_settings
 from elbow_gym.baselines.pd import CLIPPED, UNLIMITED, PDController
-from elbow_gym.baselines.policy import Policy, baseline_path, pair, read_policy
+from elbow_gym.baselines.policy import baseline_path, read_policy
 from elbow_gym.baselines.tasks import registered_arguments, task_name
-from elbow_gym.task.settings import STARTS, Settings
+from elbow_gym.task.settings import STARTS
 from elbow_gym.vector_env import ElbowArmVectorEnv
-
-Maker = Callable[[ElbowArmVectorEnv], Controller]
-"""Function that makes a controller for an environment."""
 
 ELBOW_COUNTS = (2, 1, 0)
 """Elbow counts of the rigid table that players are compared at."""
 TABLE_ENV = "ElbowArmTable-v0"
-TABLE = "table"
-"""Name of the compliant table where others have their number of elbows."""
 
 
 class Classical(NamedTuple):
@@ -54,53 +49,6 @@ CLASSICAL: dict[str, Classical] = {
 and is read at 10 kHz."""
 LQR_EFFORT = 20.0
 """Time of the LQR's control period, times the PD's: its gains are found before the first."""
-
-
-@dataclass(frozen=True)
-class Player:
-    """A controller with the environment it plays in."""
-
-    name: str
-    """Name on the command line, in tables and in files of results."""
-    task: str
-    """Short name of the environment, as `agents.tasks.task_name` gives it."""
-    settings: Settings
-    """Arguments of the environment."""
-    make: Maker
-    label: str
-    """Name in figures and tables for readers."""
-    colour: str
-    """Colour in figures, #rrggbb."""
-    marker: str
-    """Marker in figures, Matplotlib's letter."""
-    seed: int | None = None
-    """Seed of the training; None where nothing was trained."""
-    effort: float = 1.0
-    """Time of a control period, start included, as a multiple of the PD's [-], for the time left."""
-    identity: str = ""
-    """Digest of what the player is made of, beyond the code; empty where results must not be taken over."""
-    starts_together: bool = False
-    """Whether one controller serves arms that start in different poses at the same time."""
-
-    @property
-    def work(self) -> int:
-        """Cost of an episode, in control periods of the PD."""
-        return round(self.effort * self.settings.horizon)
-
-
-def player_of(name: str, settings: Settings, make: Maker, **more: Any) -> Player:
-    """A player from any maker of a controller; colour and marker are those of `agents.style`, if it has the name.
-
-    Args:
-        name: name of the player.
-        settings: arguments of the environment.
-        make: gives the controller for an environment with these settings.
-        more: further fields of `Player`.
-    """
-    label, colour, marker = look(name)
-    bearing = TABLE if settings.table is not False else f"elbows{len(settings.elbow_joints)}"
-    fields = {"task": bearing, "label": label, "colour": colour, "marker": marker, **more}
-    return Player(name=name, settings=settings, make=make, **fields)
 
 
 class Entry(NamedTuple):
@@ -179,39 +127,71 @@ def learned() -> dict[Entry, str]:
     return found
 
 
-def find_player(name: str, elbows: int | None = None, env: str = "ElbowArm-v0") -> Player:
-    """A player by its name, as the command line takes it.
+def find_player(
+    what: Any,
+    elbows: Elbows | None = None,
+    env: str = "ElbowArm-v0",
+    arguments: Mapping[str, Any] | None = None,
+    trust: bool = False,
+) -> Player:
+    """A player by its name, as the command line takes it, or from a Python object.
 
     Args:
-        name: one of the registry ("pd", "lqr", "ppo"), or the path of a policy, which brings its own environment.
+        what: one of the registry ("pd", "lqr", "ppo"), one of `own.KINDS`, either with LABEL= before it; or an object
+            that `own.python_player` takes. Policies, and ONNX files with a contract, bring their environments.
         elbows: elbows on the table; the environment's own number when None.
         env: id of the environment.
+        arguments: further arguments of the environment, such as the arm, which take precedence over the player's own.
+        trust: whether a file that may run code when it is read may be read.
 
     Raises:
-        ValueError: there is no such player, or a policy was trained with other elbows.
+        ValueError: there is no such player, it does not fit the environment, or its file is not trusted.
     """
-    registered = registered_arguments(env)
-    entry = Entry(name, registered.get("elbows", 2) if elbows is None else elbows, env)
-    if name in CLASSICAL or (name == "lqr" and env == "ElbowArm-v0") or entry in learned():
-        return entry.player()
-    is_path = pair(Path(name))[0].is_file()
-    if not is_path and not shipped_seeds(f"{name}_{task_name(env, elbows)}"):
-        beside = {one.name for one in entries() if one[1:] == entry[1:]}
-        known = sorted({*CLASSICAL, *beside})
-        raise ValueError(f"player must be one of {known} in {task_name(env, elbows)}, or a policy's path, got {name!r}")
-    policy = load_policy(name) if is_path else load_policy(name, elbows=elbows, env=env)
-    if elbows is not None and policy.settings.elbows != elbows:
-        raise ValueError(f"elbows must be {policy.settings.elbows} as in the policy's training, got {elbows}")
-    task = task_name(policy.card.env, policy.card.environment["elbows"])
-    return policy_player(name, policy, policy.settings, task=task)
+    more = dict(arguments or {})
+    if isinstance(what, Player):
+        return what
+    if not isinstance(what, str):
+        return python_player(getattr(what, "__name__", type(what).__name__), what, elbows, env, more)
+    label, name = labelled(what)
+    found = _registered(name, elbows, env, more) or own_player(name, elbows, env, more, trust)
+    if found is None:
+        task = "joints" if isinstance(elbows, tuple) else task_name(env, elbows)
+        raise ValueError(f"player must be one of {known_names(elbows, env)} in {task}, or {KINDS}, got {name!r}")
+    return relabelled(found, label)
 
 
-def classical_player(name: str, elbows: int | None, env: str) -> Player:
-    """One of `CLASSICAL` in a registered environment."""
+def known_names(elbows: Elbows | None = None, env: str = "ElbowArm-v0") -> list[str]:
+    """Names of the registry in an environment with elbows on the table, the classical controllers' first."""
+    count = registered_arguments(env).get("elbows", 2) if elbows is None else elbows
+    beside = {one.name for one in entries() if one[1:] == (count, env)}
+    return [*CLASSICAL, *sorted(beside - set(CLASSICAL))]
+
+
+def _registered(name: str, elbows: Elbows | None, env: str, more: Mapping[str, Any]) -> Player | None:
+    """The player of a name in the registry; None where it is not there."""
+    count = registered_arguments(env).get("elbows", 2) if elbows is None else elbows
+    if name in CLASSICAL:
+        return classical_player(name, elbows, env, more)
+    if name == "lqr" and env == "ElbowArm-v0":
+        if more or isinstance(count, tuple):
+            raise ValueError(f"lqr must play its optimal trajectory in the default environment, got {sorted(more)}")
+        return lqr_player(count)
+    if isinstance(count, tuple):
+        return None
+    if (entry := Entry(name, count, env)) in learned():
+        found = entry.player()
+        return replace(found, settings=replace(found.settings, **more))
+    if shipped_seeds(f"{name}_{task_name(env, elbows)}"):
+        policy = load_policy(name, elbows=elbows, env=env)
+        return policy_player(name, policy, replace(policy.settings, **more))
+    return None
+
+
+def classical_player(name: str, elbows: Elbows | None, env: str, more: Mapping[str, Any] | None = None) -> Player:
+    """One of `CLASSICAL` in a registered environment, whose further arguments `more` has."""
     arguments, make, effort = CLASSICAL[name]
-    settings = task_settings(env, elbows, arguments)
-    more = {"task": task_name(env, elbows), "effort": effort, "identity": name, "starts_together": True}
-    return player_of(name, settings, make, **more)
+    settings = task_settings(env, elbows, {**arguments, **(more or {})})
+    return player_of(name, settings, make, effort=effort, identity=name, starts_together=True)
 
 
 def optimal_trajectory(elbows: int, start: str) -> Path:
@@ -235,13 +215,3 @@ def lqr_player(elbows: int) -> Player:
 
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in paths.values())).hexdigest()
     return player_of("lqr", task_settings("ElbowArm-v0", elbows), follow, effort=LQR_EFFORT, identity=digest)
-
-
-def policy_player(name: str, policy: Policy, settings: Settings, **more: Any) -> Player:
-    """A policy in environments that it was made for; its maker raises ValueError in others. See `player_of`."""
-
-    def make(env: ElbowArmVectorEnv) -> Controller:
-        policy.check(env)
-        return policy
-
-    return player_of(name, settings, make, identity=policy.card.digest, **more)

@@ -171,18 +171,9 @@ def _started(
     if len(apart) == 1:
         return apart[0]
     env = ElbowArmVectorEnv(len(starts) * len(seeds), **settings.arguments, autoreset_mode="Disabled")
-    env.set_state(_side_by_side([one.get_state() for one, _ in apart]))
+    for i, (one, _) in enumerate(apart):
+        env.set_state(one.get_state(), arms=np.arange(len(seeds)) + i * len(seeds))
     return env, np.concatenate([observation for _, observation in apart])
-
-
-def _side_by_side(states: Sequence[Any]) -> Any:
-    """States of environments as the state of one with the arms of all."""
-    first = states[0]
-    if isinstance(first, dict):
-        return {name: _side_by_side([state[name] for state in states]) for name in first}
-    if isinstance(first, list):
-        return [entry for state in states for entry in state]
-    return np.concatenate(states)
 
 
 def thinned(run: Recording, period: float) -> Recording:

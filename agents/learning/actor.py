@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from agents.files import copy_whole, write_text, write_whole
-from elbow_gym.baselines.policy import Policy, PolicyCard, Weights, pair
+from agents.files import copy_whole, write_whole
+from elbow_gym.baselines.policy import Policy, Weights, pair
+from elbow_gym.baselines.policy_card import PolicyCard
 from elbow_gym.task.settings import Settings
 
 
@@ -107,11 +108,17 @@ def actor_layers(model: Any) -> list[Any]:
 
 def save_policy(policy: Policy, path: Path) -> None:
     """Writes `path`.safetensors and `path`.json, each whole or not at all."""
-    from safetensors.numpy import save_file
+    for file, content in reversed(files_of(policy, path).items()):
+        write_whole(file, lambda temporary, content=content: temporary.write_bytes(content))
+
+
+def files_of(policy: Policy, path: Path) -> dict[Path, bytes]:
+    """Contents of `path`.json and `path`.safetensors, in this order."""
+    # Into memory: safetensors hides an operating system's error, such as that of a full disk.
+    from safetensors.numpy import save
 
     card, weights = pair(path)
-    write_whole(weights, lambda temporary: save_file(policy.weights, temporary))
-    write_text(card, json.dumps(asdict(policy.card), indent=2) + "\n")
+    return {card: (json.dumps(asdict(policy.card), indent=2) + "\n").encode(), weights: save(policy.weights)}
 
 
 def copy_policy(source: Path, target: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import multiprocessing
 import sys
 import time
 from collections.abc import Mapping
@@ -13,13 +12,19 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
+from agents.cli import forget_lost_terminal
 from agents.learning.actor import policy_of
 from agents.learning.checkpoint import save_checkpoint
 from agents.learning.evaluation import evaluation, evaluation_row, evaluation_seeds, sentence
 from agents.learning.run import Run
+from agents.learning.run_folder import Checkpoint
 from agents.learning.training_env import MeteredVectorEnv
+from agents.workers import unwanted
 from elbow_gym.baselines.policy import Policy
 from elbow_gym.task.settings import Settings
+
+NEW: dict[str, Any] = {"steps": 0, "evaluated": -1, "training_seconds": 0.0, "wall_seconds": 0.0, "evaluations": []}
+"""Progress of a run that has just begun."""
 
 
 class Keeper(BaseCallback):
@@ -28,23 +33,22 @@ class Keeper(BaseCallback):
     Args:
         run: the run.
         env: the batched environment under the model's.
-        progress: progress of the checkpoint that the run goes on from; None for a new run.
+        found: checkpoint that the run goes on from; None for a new run.
         position: line of the progress bar on the terminal, from 0.
     """
 
-    def __init__(
-        self, run: Run, env: MeteredVectorEnv, progress: Mapping[str, Any] | None = None, position: int = 0
-    ) -> None:
+    def __init__(self, run: Run, env: MeteredVectorEnv, found: Checkpoint | None = None, position: int = 0) -> None:
         super().__init__()
         self._run, self._env, self._settings = run, env, Settings(**run.environment)
-        self._evaluated = -1 if progress is None else int(progress["evaluated"])
-        self._training = 0.0 if progress is None else float(progress["training_seconds"])
-        self._wall = 0.0 if progress is None else float(progress["wall_seconds"])
-        self._first = 0 if progress is None else int(progress["steps"])
+        progress = NEW if found is None else found.progress()
+        self._evaluated, self._first = progress["evaluated"], progress["steps"]
+        self._training, self._wall = progress["training_seconds"], progress["wall_seconds"]
+        self._rows: list[list[float]] = list(progress["evaluations"])
         self._now = self._saved = time.monotonic()
-        self._rows = [] if progress is None else run.files.evaluations(self._first)
-        # Without its second file, which a kill may prevent, what the checkpoint repeats writes both anew.
-        self._best = None if progress is None else run.files.best()
+        self._best = None
+        if found is not None:
+            self._best = run.files.restore_best(found)
+            run.files.write_evaluations(self._rows)
         self._bar = tqdm(
             total=run.settings.total_timesteps,
             initial=self._first,
@@ -75,10 +79,18 @@ class Keeper(BaseCallback):
         self._now = now
 
     def show(self, steps: int) -> None:
-        """Moves the progress bar to a number of control periods."""
-        self._bar.update(steps - self._bar.n)
+        """Moves the progress bar to a number of control periods. KeyboardInterrupt where the run is `unwanted`."""
+        if unwanted():
+            raise KeyboardInterrupt
+        try:
+            self._bar.update(steps - self._bar.n)
+        except OSError:
+            # Whoever closes a terminal may want the run to be saved, if not to go on.
+            forget_lost_terminal()
 
     def _on_step(self) -> bool:
+        if unwanted():
+            raise KeyboardInterrupt
         spent = self._wall + time.monotonic() - self._now
         return self._run.minutes is None or spent < 60.0 * self._run.minutes
 
@@ -90,10 +102,6 @@ class Keeper(BaseCallback):
         if self.num_timesteps // every > self._evaluated // every:
             self.evaluate(self.model)
         if time.monotonic() - self._saved > self._run.checkpoint_seconds:
-            parent = multiprocessing.parent_process()
-            if parent is not None and not parent.is_alive():
-                # Nobody waits for this seed any more, and whoever resumes it would train beside it.
-                raise KeyboardInterrupt
             self.checkpoint(self.model)
 
     def _on_rollout_end(self) -> None:
@@ -122,8 +130,9 @@ class Keeper(BaseCallback):
             "evaluated": self._evaluated,
             "training_seconds": self._training,
             "wall_seconds": self._wall,
+            "evaluations": self._rows,
         }
-        save_checkpoint(self._run.files, model, model.get_env(), progress)
+        save_checkpoint(self._run.files, model, model.get_env(), progress, self._best)
         self.tick(training=False)
         self._saved = self._now
 

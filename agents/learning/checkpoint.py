@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import platform
 import random
 from collections.abc import Mapping
 from typing import Any
@@ -9,20 +11,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.learning.run import versions
 from agents.learning.run_folder import Checkpoint, RunFolder
+from elbow_gym.baselines.policy import Policy
 
 BUFFER_ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 """Arrays of Stable-Baselines3's replay buffer."""
 
 
-def save_checkpoint(folder: RunFolder, model: Any, monitored: Any, progress: Mapping[str, Any]) -> None:
+def save_checkpoint(
+    folder: RunFolder, model: Any, monitored: Any, progress: Mapping[str, Any], best: Policy | None
+) -> None:
     """Writes a checkpoint of the training as it is now.
 
     Args:
         folder: the run's.
         model: model of Stable-Baselines3.
         monitored: the `VecMonitor` over the `SB3VecEnv` that it trains in.
-        progress: control periods and seconds so far, JSON types only.
+        progress: control periods, seconds and evaluations so far, JSON types only.
+        best: policy with the best return so far.
     """
     import torch
 
@@ -36,7 +43,32 @@ def save_checkpoint(folder: RunFolder, model: Any, monitored: Any, progress: Map
     }
     buffer = getattr(model, "replay_buffer", None)
     arrays = None if buffer is None else _filled(buffer)
-    folder.write_checkpoint(model.num_timesteps, model.save, arrays, state, progress)
+    # Into memory first: torch hides an operating system's error, such as that of a full disk.
+    saved = io.BytesIO()
+    model.save(saved)
+    progress = {**progress, "versions": running()}
+    folder.write_checkpoint(model.num_timesteps, saved.getvalue(), arrays, state, progress, best)
+
+
+def buffer_size(model: Any) -> int:
+    """Size of a model's replay buffer once it is full [B]; 0 without one."""
+    buffer = getattr(model, "replay_buffer", None)
+    return 0 if buffer is None else sum(getattr(buffer, name).nbytes for name in BUFFER_ARRAYS)
+
+
+def running() -> dict[str, str]:
+    """Versions that a training's bits depend on: Python's without its patch, and the libraries'."""
+    return {"python": ".".join(platform.python_version_tuple()[:2]), **versions()}
+
+
+def check_versions(checkpoint: Checkpoint) -> None:
+    """Raises ValueError naming both versions where a checkpoint was saved by others than run now."""
+    before, now = checkpoint.progress().get("versions", {}), running()
+    for name, version in now.items():
+        if before.get(name) != version:
+            raise ValueError(
+                f"{name} of a resumed run must be {before.get(name)} as when {checkpoint.path} was saved, got {version}"
+            )
 
 
 def load_checkpoint(checkpoint: Checkpoint, model_class: Any, monitored: Any) -> Any:

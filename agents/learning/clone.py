@@ -17,11 +17,14 @@ from numpy.typing import NDArray
 
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import Trajectory
+from agents.files import check_writable
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.run import machine, versions
 from agents.learning.run_folder import RunFolder
+from agents.learning.threads import one_thread
 from agents.workers import Job, Tell, compile_before, in_processes
-from elbow_gym.baselines.policy import Policy, PolicyCard
+from elbow_gym.baselines.policy import Policy
+from elbow_gym.baselines.policy_card import PolicyCard
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -152,9 +155,18 @@ def clone_all(
         else:
             jobs[seed] = Job(partial(_clone_one, settings, trajectory, how, seed, folder, command), how.rounds)
     if jobs:
+        for seed, folder in zip(seeds, folders, strict=True):
+            if seed in jobs:
+                check_writable(folder)
         compile_before([settings])
-        with tqdm(total=len(jobs) * how.rounds, unit="round", desc="clone") as bar:
-            results.update(in_processes(jobs, bar.update))
+        try:
+            with tqdm(total=len(jobs) * how.rounds, unit="round", desc="clone") as bar:
+                results.update(in_processes(jobs, bar.update))
+        except KeyboardInterrupt:
+            for folder in folders:
+                finished = RunFolder(folder).result() is not None
+                print(f"{folder.name}: {'finished' if finished else 'stopped; --resume starts it anew'}", flush=True)
+            raise
     return {seed: results[seed] for seed in seeds}
 
 
@@ -173,11 +185,8 @@ def _clone_one(
     settings: Settings, trajectory: Path, how: CloneSettings, seed: int, folder: Path, command: str, tell: Tell
 ) -> dict[str, Any]:
     """Clones with one seed, in a process of its own."""
-    import torch
-
     from agents.learning.evaluation import evaluation, evaluation_row, evaluation_seeds
 
-    torch.set_num_threads(1)
     files = RunFolder(folder)
     files.open(_record(settings, trajectory, how, seed), resume=True)
     rows: list[list[float]] = []
@@ -201,7 +210,8 @@ def _clone_one(
         tell(1)
         since = time.monotonic()
 
-    clone(settings, Trajectory.load(trajectory), how, seed, card, after_round)
+    with one_thread():
+        clone(settings, Trajectory.load(trajectory), how, seed, card, after_round)
     result = {
         "name": folder.name,
         "seed": seed,

@@ -6,59 +6,22 @@ import io
 import json
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
+from typing import TYPE_CHECKING, Annotated, Any, Union
 
 import tyro
 from tyro.conf import OmitArgPrefixes, subcommand
 
-from agents.cli import Count, JsonObject, Seed, spelled
+from agents.cli import Count, Seed, spelled
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.presets import ALGORITHMS, default_settings
 from agents.learning.settings import AlgorithmSettings
+from agents.task_options import TaskOptions
+from agents.tasks import RUNS
 
 if TYPE_CHECKING:
     from agents.learning.run import Run
-    from elbow_gym.task.settings import Settings
-
-
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """Environment to train in. Its id and the elbows choose the defaults of the algorithm options."""
-
-    env: Literal["ElbowArm-v0", "ElbowArmTable-v0", "ElbowArmRandom-v0"] = "ElbowArm-v0"
-    """Gymnasium id of the environment."""
-    elbows: int | None = None
-    """Number of elbows on the table; that of the id, or else 2, when None."""
-    environment: JsonObject = field(default_factory=dict)
-    """Further arguments of the environment, such as '{"energy_weight": 0.002}'."""
-
-    @property
-    def name(self) -> str:
-        """Short name of the task, such as "elbows2"."""
-        from elbow_gym.baselines.tasks import task_name
-
-        return task_name(self.env, self.elbows)
-
-    def settings(self) -> Settings:
-        """Settings of the environment.
-
-        Raises:
-            ValueError: `environment` holds an argument that no environment has, or elbows; or a value is refused.
-        """
-        from agents.tasks import task_settings
-        from elbow_gym.task.settings import Settings
-
-        allowed = sorted({field.name for field in fields(Settings)} - {"elbows"})
-        for name in self.environment:
-            if name not in allowed:
-                raise ValueError(f"--environment must hold only {', '.join(allowed)}, got {name} (elbows: --elbows)")
-        try:
-            return task_settings(self.env, self.elbows, self.environment)
-        except TypeError as error:
-            given = json.dumps(self.environment)
-            raise ValueError(f"--environment must hold values of the right type, got {given} ({error})") from error
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +35,7 @@ class Seeds:
     resume: bool = False
     """Whether runs go on, from their last checkpoint where they have one; finished ones are left alone.
     Without it, a folder that holds a run is refused."""
-    output: Path = Path("runs")
+    output: Path = RUNS
     """Folder in which each run gets its own."""
 
     @property
@@ -110,21 +73,18 @@ class Teacher:
 def train_command(words: Sequence[str]) -> Callable[..., None]:
     """The command `train`, whose algorithm options have the defaults of the task that the words name."""
 
-    def train(task: OmitArgPrefixes[Task], run: OmitArgPrefixes[Schedule], algorithm: AlgorithmSettings) -> None:
+    def train(task: OmitArgPrefixes[TaskOptions], run: OmitArgPrefixes[Schedule], algorithm: AlgorithmSettings) -> None:
         """Trains agents, several seeds side by side; Ctrl-C keeps the best policies so far.
 
-        Each seed has a folder OUTPUT/ALGORITHM[_LABEL]_TASK_seedK with its best policy, evaluations.csv, a checkpoint
+        Each seed has a folder OUTPUT/ALGORITHM[_LABEL]_TASK_seedK with its best policy, evaluations.csv, checkpoints
         and TensorBoard logs. `train ppo --help` lists the options of PPO.
         """
-        from agents.learning.evaluation import sentence
         from agents.learning.train import train_all
 
         runs = runs_of(task, run, algorithm, spelled("agents", "train", words))
         names = " to ".join(dict.fromkeys((runs[0].name, runs[-1].name)))
         print(f"{names}, into {run.output}: {algorithm}", flush=True)
-        for result in train_all(runs, run.workers, run.resume):
-            state = "finished" if result["finished"] else "not finished"
-            print(f"{result['name']}: {state} after {result['steps']:,d} steps, best: {sentence(result['best'])}")
+        train_all(runs, run.workers, run.resume)
 
     # The defaults follow from the task, and are known only now.
     train.__annotations__["algorithm"] = _algorithms(_named_task(words))
@@ -156,7 +116,7 @@ def clone_command(words: Sequence[str]) -> Callable[..., None]:
     return clone
 
 
-def runs_of(task: Task, schedule: Schedule, settings: AlgorithmSettings, command: str) -> list[Run]:
+def runs_of(task: TaskOptions, schedule: Schedule, settings: AlgorithmSettings, command: str) -> list[Run]:
     """The runs that a command line asks for, one a seed.
 
     Raises:
@@ -205,10 +165,10 @@ def _named_task(words: Sequence[str]) -> str:
     """Name of the task that a command line asks for; the usual one where it is wrong, which the whole parse reports."""
     try:
         with redirect_stderr(io.StringIO()):
-            task, _ = tyro.cli(Task, args=words, return_unknown_args=True, add_help=False)
+            task, _ = tyro.cli(TaskOptions, args=words, return_unknown_args=True, add_help=False)
         return task.name
     except (SystemExit, ValueError):
-        return Task().name
+        return TaskOptions().name
 
 
 def _first_line(documented: Any) -> str:

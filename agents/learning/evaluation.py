@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from agents.evaluation.metrics import metrics
+from agents.evaluation.players import Maker
 from agents.evaluation.recording import record
 from elbow_gym.baselines.policy import Policy
 from elbow_gym.task.settings import Settings
@@ -37,8 +38,18 @@ def evaluation_seeds(settings: Settings) -> tuple[int, ...]:
 
 
 def evaluation(policy: Policy, settings: Settings) -> dict[str, float]:
-    """Means over the evaluation seeds, by name; "steady" counts the last 60 % of the episode, 2-5 s by default."""
-    recording = record(settings, lambda _: policy, evaluation_seeds(settings))
+    """Metrics of a policy during its training, by name, as `controller_evaluation` gives them."""
+    return controller_evaluation(policy.acting_in, settings)
+
+
+def controller_evaluation(make: Maker, settings: Settings) -> dict[str, float]:
+    """Means over the evaluation seeds, by name; "steady" counts the last 60 % of the episode, 2-5 s by default.
+
+    Args:
+        make: gives the controller for an environment with these settings.
+        settings: arguments of the environment.
+    """
+    recording = record(settings, make, evaluation_seeds(settings))
     whole, steady = metrics(recording), metrics(recording, 0.4 * recording.time[-1])
     return {
         "return": float(whole["return"].mean()),

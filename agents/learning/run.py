@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import platform
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
@@ -13,6 +12,7 @@ from typing import Any
 
 from agents.learning.run_folder import RunFolder
 from agents.learning.settings import AlgorithmSettings
+from agents.workers import cores
 
 PACKAGES = ("elbow-gym", "stable-baselines3", "torch", "gymnasium", "numpy", "numba")
 """Packages that a training's outcome depends on."""
@@ -91,8 +91,8 @@ class Run:
 
 
 def machine() -> str:
-    """Architecture and number of cores of this machine, for the cards of policies."""
-    return f"{platform.machine()}, {os.cpu_count()} cores"
+    """Architecture of this machine and number of cores that may be used, for the cards of policies."""
+    return f"{platform.machine()}, {cores()} cores"
 
 
 def versions() -> dict[str, str]:

@@ -3,73 +3,45 @@
     run.json                       record of what is trained: algorithm, environment, settings, seed
     best.json, best.safetensors    policy with the best return so far
     evaluations.csv                one row per evaluation, `agents.learning.evaluation.COLUMNS`
-    checkpoint_STEPS/              state that a killed run goes on from
-        progress.json              control periods and seconds so far
+    checkpoint_STEPS/              state that a killed run goes on from; the last two are kept
+        checksums.json             SHA-256 of each of the other files
+        progress.json              control periods, seconds and evaluations so far, versions of the libraries
         model.zip                  networks and optimisers, as Stable-Baselines3 saves them
         replay_buffer.npz          filled part of the replay buffer, of algorithms that have one
         state.pkl                  environment, episode statistics and random generators
+        best.json, .safetensors    policy with the best return at the checkpoint
     tensorboard/                   logs, written by Stable-Baselines3
     result.json                    outcome of the training
 
-model.zip and state.pkl hold pickles, and whoever writes a pickle can run code where it is read: resume only runs of
-your own. The policies hold none, see `elbow_gym.baselines.policy`.
+model.zip and state.pkl hold pickles, and whoever writes a pickle can run code where it is read. The checksums find
+damage, not malice, since whoever alters a file can alter its checksum: never resume a run folder that a stranger gave
+you. The policies hold no pickles, see `elbow_gym.baselines.policy`.
 """
 
 from __future__ import annotations
 
 import csv
-import json
-import math
-import pickle
+import errno
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import sys
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from agents.files import copy_whole, write_csv, write_folder, write_text
+from agents.files import copy_whole, read_json, write_csv, write_json
 from agents.learning.actor import copy_policy, save_policy
+from agents.learning.checkpoint_folder import Checkpoint, write_checkpoint
 from agents.learning.evaluation import COLUMNS
+from agents.tasks import BEST
 from elbow_gym.baselines.policy import Policy, pair, read_policy
 
-RECORD, RESULT, EVALUATIONS, BEST, TENSORBOARD = "run.json", "result.json", "evaluations.csv", "best", "tensorboard"
+RECORD, RESULT, EVALUATIONS, TENSORBOARD = "run.json", "result.json", "evaluations.csv", "tensorboard"
 CHECKPOINT = "checkpoint_"
 """Start of a checkpoint's name; the control periods so far follow."""
-PROGRESS, MODEL, BUFFER, STATE = "progress.json", "model.zip", "replay_buffer.npz", "state.pkl"
-
-
-class Checkpoint:
-    """Checkpoint as it was saved, whose files are read when they are asked for.
-
-    Args:
-        path: folder of the checkpoint.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    @property
-    def model(self) -> Path:
-        """File of networks and optimisers, for Stable-Baselines3's `load`."""
-        return self.path / MODEL
-
-    def progress(self) -> dict[str, Any]:
-        """Control periods and seconds so far, JSON types only."""
-        return _read_json(self.path / PROGRESS)
-
-    def state(self) -> dict[str, Any]:
-        """Environment, episode statistics and random generators, unpickled."""
-        with (self.path / STATE).open("rb") as handle:
-            return pickle.load(handle)
-
-    def buffer(self) -> Iterator[tuple[str, NDArray[Any]]]:
-        """Names and arrays of the replay buffer, one after the other, since each is large; nothing without a buffer."""
-        if (self.path / BUFFER).is_file():
-            with np.load(self.path / BUFFER, allow_pickle=False) as arrays:
-                for name in arrays.files:
-                    yield name, arrays[name]
+KEPT = 2
+"""Number of checkpoints that are kept, so that damage to the last one costs little."""
 
 
 class RunFolder:
@@ -100,7 +72,7 @@ class RunFolder:
             resume: whether a run in the folder goes on.
 
         Raises:
-            ValueError: there is a run and it is not resumed, it had other settings, or it does not say which.
+            ValueError: there is a run and it is not resumed, had other settings, or has no record or a damaged one.
         """
         path = self.path / RECORD
         if not path.is_file():
@@ -109,7 +81,7 @@ class RunFolder:
             return
         if not resume:
             raise ValueError(f"output must be free of earlier runs, or --resume be given, got {self.path}")
-        before, now = _flat(_read_json(path)), _flat(record)
+        before, now = _flat(read_json(path)), _flat(record)
         for name in {**before, **now}:
             if before.get(name) != now.get(name):
                 raise ValueError(
@@ -120,28 +92,41 @@ class RunFolder:
         """Writes the record of a new run, or checks that the folder's is the same. Arguments and errors of `check`."""
         self.check(record, resume)
         if not (self.path / RECORD).is_file():
-            _write_json(self.path / RECORD, record)
+            write_json(self.path / RECORD, record)
 
     def result(self) -> dict[str, Any] | None:
-        """Outcome of the training; None as long as there is none."""
-        path = self.path / RESULT
-        return _read_json(path) if path.is_file() else None
+        """Outcome of the training; None as long as there is none, and with a line on stderr when it is damaged."""
+        try:
+            return read_json(self.path / RESULT)
+        except FileNotFoundError:
+            return None
+        except ValueError as error:
+            print(f"{error}; it counts as missing", file=sys.stderr)
+            return None
 
     def write_result(self, result: Mapping[str, Any]) -> None:
         """Writes the outcome of the training, JSON types only."""
-        _write_json(self.path / RESULT, result)
+        self._check_there()
+        write_json(self.path / RESULT, result)
 
-    def evaluations(self, last: float = math.inf) -> list[list[float]]:
-        """Rows of `COLUMNS` up to `last` control periods; a resumed run measures later ones again."""
+    def evaluations(self) -> list[list[float]]:
+        """Rows of evaluations.csv; none without the file. ValueError naming it when it is damaged."""
         path = self.path / EVALUATIONS
         if not path.is_file():
             return []
-        with path.open(newline="", encoding="utf-8") as handle:
-            rows = [[float(cell) for cell in row] for row in list(csv.reader(handle))[1:]]
-        return [row for row in rows if row[0] <= last]
+        try:
+            header, *lines = csv.reader(path.read_text(encoding="utf-8").splitlines())
+            rows = [[float(cell) for cell in line] for line in lines]
+        except ValueError as error:
+            raise ValueError(f"{path} must hold numbers under a header, got {error}") from error
+        for row in rows:
+            if len(row) != len(header):
+                raise ValueError(f"{path} must have {len(header)} numbers in each row, got {row}")
+        return rows
 
     def write_evaluations(self, rows: Iterable[Sequence[float]]) -> None:
         """Writes all rows of `COLUMNS`."""
+        self._check_there()
         header = [f"{name} [{unit}]" for name, unit in COLUMNS.items()]
         write_csv(self.path / EVALUATIONS, header, ([f"{value:.10g}" for value in row] for row in rows))
 
@@ -150,14 +135,25 @@ class RunFolder:
         copy_whole(self.path / EVALUATIONS, target)
 
     def best(self) -> Policy | None:
-        """Policy with the best return so far; None when there is none, or a kill came between its two files."""
+        """Policy with the best return so far; None when there is none. ValueError naming a file that is damaged."""
+        return read_policy(self.path / BEST) if any(path.is_file() for path in pair(self.path / BEST)) else None
+
+    def restore_best(self, checkpoint: Checkpoint) -> Policy | None:
+        """The best policy; where its files are missing or damaged, the checkpoint's, which is written again."""
+        saved = checkpoint.best()
         try:
-            return read_policy(self.path / BEST) if pair(self.path / BEST)[0].is_file() else None
-        except ValueError:
-            return None
+            own, reason = self.best(), f"no {BEST}.json in {self.path}"
+        except ValueError as error:
+            own, reason = None, str(error)
+        if own is not None or saved is None:
+            return own
+        print(f"{reason}; written again from {checkpoint.path.name}", file=sys.stderr)
+        self.write_best(saved)
+        return saved
 
     def write_best(self, policy: Policy) -> None:
         """Writes the policy with the best return so far."""
+        self._check_there()
         save_policy(policy, self.path / BEST)
 
     def best_size(self) -> int:
@@ -169,55 +165,72 @@ class RunFolder:
         copy_policy(self.path / BEST, target)
 
     def checkpoint(self) -> Checkpoint | None:
-        """The latest checkpoint; None when there is none."""
-        found = self._checkpoints()
-        return Checkpoint(found[-1]) if found else None
+        """The latest checkpoint that is whole; None when there is none at all. A line on stderr names a damaged file.
+
+        Raises:
+            ValueError: there are checkpoints, and all are damaged.
+        """
+        damaged: list[Path] = []
+        for path in reversed(self._checkpoints()):
+            bad = Checkpoint(path).damage()
+            if bad is None:
+                for one in damaged:
+                    print(f"{one} is damaged or missing; going on from {path.name}", file=sys.stderr)
+                return Checkpoint(path)
+            damaged.append(bad)
+        if damaged:
+            names = ", ".join(map(str, damaged))
+            raise ValueError(f"a checkpoint of the run must be whole, got damaged or missing {names}")
+        return None
 
     def write_checkpoint(
         self,
         steps: int,
-        save_model: Callable[[Path], Any],
+        model: bytes,
         buffer: Mapping[str, NDArray[Any]] | None,
         state: Mapping[str, Any],
         progress: Mapping[str, Any],
+        best: Policy | None = None,
     ) -> None:
-        """Writes a checkpoint and removes the older ones; one of the same number of control periods stays as it is.
+        """Writes a checkpoint and keeps the one before it; a whole one of the same control periods stays as it is.
 
         Args:
             steps: control periods of the training so far.
-            save_model: writes networks and optimisers into the file that it is given.
+            model: networks and optimisers, as Stable-Baselines3 saves them.
             buffer: arrays of the replay buffer by name; None for algorithms without one.
             state: environment, episode statistics and random generators; it is pickled.
             progress: control periods and seconds so far, JSON types only.
+            best: policy with the best return so far; None when none was evaluated.
         """
+        self._check_there()
         target = self.path / f"{CHECKPOINT}{steps:012d}"
-        if target.exists():
-            return
 
-        def write(folder: Path) -> None:
-            save_model(folder / MODEL)
-            if buffer is not None:
-                np.savez(folder / BUFFER, **buffer)
-            with (folder / STATE).open("wb") as handle:
-                pickle.dump(dict(state), handle)
-            _write_json(folder / PROGRESS, progress)
-
-        write_folder(target, write)
-        # Unfinished folders are those of killed runs.
-        for old in [*self.path.glob(f".{CHECKPOINT}*"), *self._checkpoints()[:-1]]:
+        if not target.exists() or Checkpoint(target).damage() is not None:
+            shutil.rmtree(target, ignore_errors=True)
+            write_checkpoint(target, model, buffer, state, progress, best)
+        # Later ones are damaged, or of a past that did not come again.
+        found = self._checkpoints()
+        kept = [path for path in found if path <= target][-KEPT:]
+        for old in (path for path in found if path not in kept):
             shutil.rmtree(old, ignore_errors=True)
+        self._sweep()
+
+    def _check_there(self) -> None:
+        """FileNotFoundError where the folder that the run began in has gone."""
+        if not (self.path / RECORD).is_file():
+            raise FileNotFoundError(errno.ENOENT, f"the run's folder is gone, or its {RECORD}", str(self.path))
+
+    def _sweep(self) -> None:
+        """Removes what a killed run has left under temporary names."""
+        for rest in self.path.glob(".*"):
+            if rest.is_dir():
+                shutil.rmtree(rest, ignore_errors=True)
+            else:
+                rest.unlink(missing_ok=True)
 
     def _checkpoints(self) -> list[Path]:
         """Folders of the checkpoints, the latest last."""
         return sorted(self.path.glob(f"{CHECKPOINT}*"))
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    return json.loads(path.read_text(encoding="utf-8"))
-
-
-def _write_json(path: Path, plain: Mapping[str, Any]) -> None:
-    write_text(path, json.dumps(dict(plain), indent=2) + "\n")
 
 
 def _flat(plain: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

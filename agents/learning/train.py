@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import sys
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
+import threading
+from collections.abc import Iterator, Sequence
+from concurrent.futures import wait
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
-from agents.learning.checkpoint import load_checkpoint
+from agents.cli import forget_lost_terminal, sentence
+from agents.files import check_space, check_writable
+from agents.learning.checkpoint import buffer_size, check_versions, load_checkpoint
+from agents.learning.checkpoint_folder import Checkpoint
+from agents.learning.evaluation import sentence as figures_sentence
 from agents.learning.run import Run
+from agents.learning.run_folder import KEPT
 from agents.learning.sac.settings import SACSettings
-from agents.workers import compile_before
+from agents.learning.threads import one_thread
+from agents.workers import GRACE, Pool, compile_before, outcome
 from elbow_gym.task.settings import Settings
 
 SEED_STRIDE = 1_000_000
@@ -23,21 +30,23 @@ def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
     """Trains one seed; Ctrl-C ends it and keeps the best policy so far.
 
     Writes what `RunFolder` lists: the best policy each time an evaluation improves, a row per evaluation, a checkpoint
-    by the clock, TensorBoard logs, and the result at the end.
+    by the clock, TensorBoard logs, and the result at the end. Torch computes with one thread meanwhile.
 
     Args:
         run: what is trained.
-        resume: go on from the folder's latest checkpoint; a run that has made all its steps is left alone. Without a
-            checkpoint it starts anew.
+        resume: go on from the folder's latest checkpoint that is whole; a run that has made all its steps is left
+            alone. Without a checkpoint it starts anew.
         position: line of the progress bar on the terminal, from 0.
 
     Returns:
-        Name, seed, control periods and seconds of the run, and the metrics of its best evaluation.
+        Name, seed, control periods and seconds of the run, and the metrics of its best evaluation; those are None
+        where the run was interrupted before its first.
 
     Raises:
-        ValueError: the folder holds a run and `resume` is not set, or a run with other settings.
+        ValueError: the folder holds a run and `resume` is not set, a run with other settings or of other versions of
+            the libraries, or damaged files that nothing replaces.
+        OSError: the folder cannot be written any more. Its files are those of the last checkpoint.
     """
-    import torch
     from stable_baselines3.common.vec_env import VecMonitor
 
     from agents.learning.callback import Keeper
@@ -45,46 +54,76 @@ def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
     from elbow_gym.sb3 import SB3VecEnv
 
     files, total = run.files, run.settings.total_timesteps
-    files.open(run.record(), resume)
+    files.check(run.record(), resume)
     found = files.checkpoint()
-    progress = None if found is None else found.progress()
-    result = files.result()
-    over = progress is not None and (progress["steps"] >= total or _out_of_time(run, progress))
-    # A kill between the last checkpoint and the result leaves the result to be made.
-    if over and result is not None and result["finished"]:
+    result = _result(run, found)
+    if result is not None:
         return result
-    # Small networks lose more by handing work between threads than they gain.
-    torch.set_num_threads(1)
     settings = Settings(**run.environment)
-    env = MeteredVectorEnv(run.settings.num_envs, **run.settings.training_arguments(settings.arguments))
-    monitored = VecMonitor(SB3VecEnv(env))
-    if found is not None:
-        model = load_checkpoint(found, run.settings.model_class, monitored)
-    else:
-        model = run.settings.model(monitored, run.seed, files.tensorboard)
-        monitored.seed(run.seed * SEED_STRIDE)
-    keeper = Keeper(run, env, progress, position)
-    try:
-        if found is None:
-            _prepare(run, model, env, keeper)
-        env.staggered = True
-        remaining = total - model.num_timesteps
-        model.learn(remaining, callback=keeper, log_interval=run.settings.log_interval, reset_num_timesteps=False)
-    except KeyboardInterrupt:
-        print(f"{run.name}: interrupted; keeping the best policy so far", file=sys.stderr)
-    keeper.finish(model)
+    with one_thread(), _errors_once(files.path):
+        env = MeteredVectorEnv(run.settings.num_envs, **run.settings.training_arguments(settings.arguments))
+        monitored = VecMonitor(SB3VecEnv(env))
+        if found is not None:
+            check_versions(found)
+            model = load_checkpoint(found, run.settings.model_class, monitored)
+        else:
+            model = run.settings.model(monitored, run.seed, files.tensorboard)
+            monitored.seed(run.seed * SEED_STRIDE)
+        # One more than is kept lies there while it is written.
+        check_space(files.path.parent, (1 + KEPT) * buffer_size(model))
+        files.open(run.record(), resume)
+        keeper = Keeper(run, env, found, position)
+        begun = found is not None
+        try:
+            if not begun:
+                _prepare(run, model, env, keeper)
+                begun = True
+            env.staggered = True
+            remaining = total - model.num_timesteps
+            model.learn(remaining, callback=keeper, log_interval=run.settings.log_interval, reset_num_timesteps=False)
+        except KeyboardInterrupt:
+            forget_lost_terminal()
+            print(f"{run.name}: interrupted; keeping the best policy so far", file=sys.stderr)
+        if begun:
+            keeper.finish(model)
     training, wall = keeper.seconds
     result = {
         "name": run.name,
         "seed": run.seed,
-        "steps": model.num_timesteps,
+        # Half a preparation is no start to go on from: it is made anew.
+        "steps": model.num_timesteps if begun else 0,
         "finished": model.num_timesteps >= total or (run.minutes is not None and wall >= 60.0 * run.minutes),
         "training_seconds": round(training, 1),
         "wall_seconds": round(wall, 1),
-        "best": keeper.best.card.evaluation,
+        "best": keeper.best.card.evaluation if begun else None,
     }
     files.write_result(result)
     return result
+
+
+def _result(run: Run, found: Checkpoint | None) -> dict[str, Any] | None:
+    """The result of a run that is over; None where it goes on, or a kill before the result leaves that to be made."""
+    progress, result = None if found is None else found.progress(), run.files.result()
+    over = progress is not None and (progress["steps"] >= run.settings.total_timesteps or _out_of_time(run, progress))
+    return result if over and result is not None and result.get("finished") else None
+
+
+@contextmanager
+def _errors_once(folder: Path) -> Iterator[None]:
+    """Gives the system's errors the folder's name where they have none, and has TensorBoard's thread not print its own.
+
+    The thread keeps its error, and raises it again here with the next entry.
+    """
+    before = threading.excepthook
+    threading.excepthook = lambda failed: None if isinstance(failed.exc_value, OSError) else before(failed)
+    try:
+        yield
+    except OSError as error:
+        if error.errno is not None and error.filename is None:
+            error.filename = str(folder)
+        raise
+    finally:
+        threading.excepthook = before
 
 
 def _out_of_time(run: Run, progress: dict[str, Any]) -> bool:
@@ -107,11 +146,19 @@ def _prepare(run: Run, model: Any, env: Any, keeper: Any) -> None:
 
 
 def train_all(runs: Sequence[Run], workers: int = 2, resume: bool = False) -> list[dict[str, Any]]:
-    """Trains several runs, `workers` of them at a time in processes, and returns the results in their order.
+    """Trains several runs, `workers` of them at a time in processes, and prints a line about each at its end.
+
+    Ctrl-C, or SIGTERM and SIGHUP under `agents.cli.Commands`, ends all of them; each keeps its best policy so far. A
+    run that fails leaves the others going on.
+
+    Returns:
+        The results in the runs' order.
 
     Raises:
-        ValueError: there are no runs, `workers` is not positive, or a folder holds a run and `resume` is not set, or a
-            run with other settings; no run starts then.
+        ValueError: there are no runs, `workers` is not positive, or a folder holds a run and `resume` is not set, a
+            run with other settings, or damaged files; no run starts then.
+        OSError: a folder cannot be written, before or while its run trains.
+        KeyboardInterrupt: the runs were interrupted.
     """
     if not runs:
         raise ValueError("runs must be at least one, got none")
@@ -119,20 +166,59 @@ def train_all(runs: Sequence[Run], workers: int = 2, resume: bool = False) -> li
         raise ValueError(f"workers must be positive, got {workers}")
     for run in runs:
         run.files.check(run.record(), resume)
+    for run in runs:
+        check_writable(run.folder)
     trained = Settings(**runs[0].environment)
     compile_before([(trained, runs[0].settings.num_envs), trained])
-    if workers == 1 or len(runs) == 1:
-        return [train(run, resume, 0) for run in runs]
-    from tqdm import tqdm
+    apart = workers > 1 and len(runs) > 1
+    outcomes = _side_by_side(runs, workers, resume) if apart else _one_by_one(runs, resume)
+    for run, one in zip(runs, outcomes, strict=True):
+        print(_line(run, one), flush=True)
+    for one in outcomes:
+        if isinstance(one, Exception):
+            raise one
+    if any(one is None or not one["finished"] for one in outcomes):
+        raise KeyboardInterrupt
+    return outcomes
 
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-    context = multiprocessing.get_context("spawn")
-    lock = context.RLock()
-    with ProcessPoolExecutor(min(workers, len(runs)), context, tqdm.set_lock, (lock,)) as pool:
+
+def _one_by_one(runs: Sequence[Run], resume: bool) -> list[Any]:
+    outcomes: list[Any] = []
+    for run in runs:
+        outcomes.append(_attempt(run, resume))
+        if isinstance(outcomes[-1], dict) and not outcomes[-1]["finished"]:
+            break
+    return outcomes + [None] * (len(runs) - len(outcomes))
+
+
+def _attempt(run: Run, resume: bool) -> Any:
+    try:
+        return train(run, resume)
+    except Exception as error:
+        return error
+
+
+def _side_by_side(runs: Sequence[Run], workers: int, resume: bool) -> list[Any]:
+    interrupted = False
+    with Pool(min(workers, len(runs))) as pool:
         futures = [pool.submit(train, run, resume, k) for k, run in enumerate(runs)]
         try:
-            return [future.result() for future in futures]
+            wait(futures)
         except KeyboardInterrupt:
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise
+            interrupted = True
+            pool.stop()
+            wait(futures, GRACE)
+    outcomes = [outcome(future) for future in futures]
+    # Whoever did not end in time was killed on purpose.
+    return [None if interrupted and isinstance(one, ChildProcessError) else one for one in outcomes]
+
+
+def _line(run: Run, ended: Any) -> str:
+    """What came of a run: its result, its error, or None."""
+    if ended is None:
+        return f"{run.name}: stopped; --resume goes on from its last checkpoint, or starts it"
+    if isinstance(ended, Exception):
+        return f"{run.name}: failed: {sentence(ended) or type(ended).__name__}"
+    state = "finished" if ended["finished"] else "not finished"
+    best = "no policy yet" if ended["best"] is None else f"best: {figures_sentence(ended['best'])}"
+    return f"{run.name}: {state} after {ended['steps']:,d} steps, {best}"

@@ -12,7 +12,7 @@ import numpy as np
 
 from agents.evaluation.metrics import joint_energies, metrics
 from agents.evaluation.recording import Recording, record, thinned
-from agents.files import write_csv, write_text, write_whole
+from agents.files import check_writable, write_csv, write_text, write_whole
 from agents.paper.claims import Claim, Numbers, as_markdown, verdict
 from agents.paper.figures import CASES, SETTLED, draw, write_series
 from agents.style import ELBOW_NAMES
@@ -89,6 +89,7 @@ def reproduce(output: Path = Path("reproduction"), publish: bool = False) -> Rep
     from rich.markdown import Markdown
     from tqdm import tqdm
 
+    check_writable(output)
     jobs = {(elbows, name): settings_of(elbows, name) for elbows in CASES for name in RUNS}
     n_figures = 6 + 2 * jobs[2, "paper"].parsed_arm.n_joints
     total = sum(settings.horizon for settings in jobs.values()) + FIGURE_PERIODS * n_figures

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.files import write_csv, write_text, write_whole
+from agents.files import check_writable, write_csv, write_text, write_whole
 from agents.paper.cases import RESULTS, settings_of
 from agents.paper.claims import Claim
 from agents.paper.table_cases import (
@@ -45,6 +45,7 @@ def reproduce_on_table(output: Path = Path("reproduction"), publish: bool = Fals
     from rich.markdown import Markdown
     from tqdm import tqdm
 
+    check_writable(output)
     settings = settings_of(0, "paper")
     poses = [start_pose(settings.parsed_arm, lift) for lift in LIFTS.values()]
     runs: dict[float, TableRecording] = {}

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from agents.evaluation.players import TABLE
-from agents.style import CONTROLLER_COLOURS, ELBOW_COLOURS, TARGET_COLOUR
+from agents.style import CONTROLLER_COLOURS, ELBOW_COLOURS, TARGET_COLOUR, look
 
 BACKGROUNDS = {"light": "#ffffff", "dark": "#14181d"}
 """Colours of the panels, as in page.css."""
@@ -41,9 +43,14 @@ def _channels(colour: str) -> list[float]:
     return [int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
 
 
-def stylesheet() -> str:
-    """CSS custom properties --controller-NAME, --bearing-NAME and --target for both schemes."""
-    colours = {f"controller-{name}": colour for name, colour in CONTROLLER_COLOURS.items()}
+def stylesheet(controllers: Iterable[str] = ()) -> str:
+    """CSS custom properties --controller-NAME, --bearing-NAME and --target for both schemes.
+
+    Args:
+        controllers: names of further controllers than those with colours of their own.
+    """
+    names = dict.fromkeys([*CONTROLLER_COLOURS, *controllers])
+    colours = {f"controller-{name}": look(name)[1] for name in names}
     colours |= {f"bearing-{elbows}": colour for elbows, colour in ELBOW_COLOURS.items()}
     colours[f"bearing-{TABLE}"] = TABLE_COLOUR
     colours["target"] = TARGET_COLOUR

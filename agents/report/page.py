@@ -41,7 +41,7 @@ def page(runs: Sequence[Run], results: Path) -> str:
     """The whole HTML document for the runs and the benchmark's results in a folder."""
     numbers = tables.paper_numbers(runs)
     parts = {
-        "colours": stylesheet(),
+        "colours": stylesheet(run.controller for run in runs),
         "style": _read("page.css"),
         "headline": tables.headline(numbers, runs),
         "claims": tables.claims(numbers),

@@ -17,7 +17,7 @@ from agents.evaluation.players import TABLE
 from agents.evaluation.recording import Recording
 from agents.paper.figures import CASES, SETTLED, VIEWS
 from agents.report.runs import Run
-from agents.style import CONTROLLER_MARKERS, CONTROLLER_NAMES, ELBOW_NAMES
+from agents.style import ELBOW_NAMES, look
 from elbow_gym.kinematics import joint_positions
 
 BEARINGS = {**{str(elbows): ELBOW_NAMES[elbows] for elbows in CASES}, TABLE: "table that cannot pull"}
@@ -78,7 +78,7 @@ def _plain(value: float) -> float | None:
 
 def payload(runs: Sequence[Run], results: Path) -> dict[str, Any]:
     """All of the page's data, JSON types only."""
-    controllers = list(dict.fromkeys(run.controller for run in runs))
+    controllers = {run.controller: run.label or look(run.controller)[0] for run in runs}
     shown = {run.bearing for run in runs}
     longest = max(runs, key=lambda run: run.series.time[-1])
     return {
@@ -86,10 +86,7 @@ def payload(runs: Sequence[Run], results: Path) -> dict[str, Any]:
         "lengthUnit": LENGTH_UNIT,
         "duration": float(longest.series.time[-1]),
         "settled": SETTLED,
-        "controllers": {
-            name: {"name": CONTROLLER_NAMES.get(name, name), "marker": CONTROLLER_MARKERS.get(name, "o")}
-            for name in controllers
-        },
+        "controllers": {name: {"name": label, "marker": look(name)[2]} for name, label in controllers.items()},
         "bearings": [[name, title] for name, title in BEARINGS.items() if name in shown],
         "regimes": {
             regime.name: {"start": regime.start, "since": regime.since, "meaning": regime.meaning} for regime in REGIMES

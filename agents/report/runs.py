@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from agents.evaluation.guest import Guest
 from agents.evaluation.metrics import REGIMES, metrics
+from agents.evaluation.player import Player
 from agents.evaluation.players import TABLE, Entry
 from agents.evaluation.recording import Recording, thinned
 from agents.evaluation.regimes import RECORDING_PERIOD, recordings
@@ -37,6 +40,8 @@ class Run:
     """Metrics (`agents.evaluation.metrics.UNITS`) by regime, of the regimes with this start."""
     measured: Mapping[str, Any] | None = None
     """Numbers of `agents.paper.cases.measure`; None but for the paper's PD."""
+    label: str = ""
+    """Name for readers of a player of a user's own; empty for the registry's."""
 
     @property
     def key(self) -> str:
@@ -44,7 +49,29 @@ class Run:
         return f"{self.controller}-{self.bearing}-{self.start}"
 
 
-def collect(entries: Sequence[Entry]) -> list[Run]:
+@dataclass(frozen=True)
+class Visitor:
+    """A player of a user's own at a number of elbows, where the registry has an `Entry`."""
+
+    guest: Guest
+    elbows: int
+
+    @property
+    def name(self) -> str:
+        """Name inside the page, which CSS and HTML take."""
+        return "own-" + re.sub(r"[^A-Za-z0-9]+", "-", self.guest.label)
+
+    @property
+    def bearing(self) -> str:
+        """Support of the arm: its number of elbows."""
+        return str(self.elbows)
+
+    def player(self) -> Player:
+        """The player."""
+        return self.guest.player(self.elbows, {})
+
+
+def collect(entries: Sequence[Entry | Visitor]) -> list[Run]:
     """Both runs of every entry, in the entries' order, from as many processes as there are cores, with a bar."""
     from tqdm import tqdm
 
@@ -61,7 +88,7 @@ def collect(entries: Sequence[Entry]) -> list[Run]:
     return [run for entry in entries for run in played[entry]]
 
 
-def play(entry: Entry, progress: Tell) -> list[Run]:
+def play(entry: Entry | Visitor, progress: Tell) -> list[Run]:
     """An entry's runs from all starts; `progress` gets the units of work done since its last call."""
     best = entry.player()
     exact = replace(best, settings=replace(best.settings, start_noise=0.0))
@@ -75,5 +102,7 @@ def play(entry: Entry, progress: Tell) -> list[Run]:
             if regime.start == start
         }
         measured = measure(recording) if paper else None
-        runs.append(Run(entry.name, entry.bearing, start, thinned(recording, SERIES_PERIOD), figures, measured))
+        label = best.label if isinstance(entry, Visitor) else ""
+        series = thinned(recording, SERIES_PERIOD)
+        runs.append(Run(entry.name, entry.bearing, start, series, figures, measured, label))
     return runs

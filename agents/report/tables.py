@@ -14,7 +14,7 @@ from agents.paper.claims import Numbers, disclosures, verdict
 from agents.paper.figures import CASES
 from agents.report.payload import BEARINGS
 from agents.report.runs import Run
-from agents.style import CONTROLLER_NAMES, ELBOW_NAMES
+from agents.style import CONTROLLER_NAMES, ELBOW_NAMES, look
 
 PARTS = {"nominal": "energy", "shifted": "energy_shifted", TABLE: "energy_table"}
 """Parts of the benchmark and the files of their results."""
@@ -125,12 +125,17 @@ def benchmark_table(results: Path, runs: Sequence[Run]) -> str:
     starts = {regime: run.start for run in runs for regime in run.figures}
     keys = {run.key for run in runs}
     body = ""
+    columns = [(column.name, units[column.name]) for column in shown]
     for part, rows in parts.items():
         for row in rows:
             bearing = TABLE if part == TABLE else row["elbows"]
             key = f"{row['controller']}-{bearing}-{starts.get(row['regime'])}"
-            columns = [(column.name, units[column.name]) for column in shown]
             body += _row(row, part, bearing, key if key in keys else None, columns)
+    for run in (run for run in runs if run.label):
+        for regime, figures in run.figures.items():
+            own = {"controller": run.controller, "label": run.label, "regime": regime}
+            own |= {f"{name} [{unit}]": f"{figures[name]:.6g}" for name, unit in columns if name in figures}
+            body += _row(own, "nominal", run.bearing, run.key, columns)
     return f"<table id=benchmark-table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table>"
 
 
@@ -142,7 +147,7 @@ def _rows(path: Path) -> list[dict[str, str]]:
 
 
 def _row(row: Mapping[str, str], part: str, bearing: str, key: str | None, columns: Sequence[tuple[str, str]]) -> str:
-    name = escape(CONTROLLER_NAMES.get(row["controller"], row["controller"]))
+    name = escape(row.get("label") or look(row["controller"])[0])
     label = name if key is None else f'<button type="button" data-run="{key}">{name}</button>'
     cells = f"<td>{'table' if bearing == TABLE else escape(bearing)}</td><td>{escape(row['regime'])}</td>"
     for column, unit in columns:

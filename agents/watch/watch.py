@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from agents.evaluation.players import find_player
+from agents.tasks import Elbows
 from agents.watch.video import FRAME_RATES, Pixels, check_video, write_video
 from elbow_gym.checks import positive
 from elbow_gym.rendering.overlay import Instruments
 from elbow_gym.rendering.painter import Colour
 from elbow_gym.rendering.screen import Window, display_driver, load_pygame, pixels_of
 from elbow_gym.rendering.viewer import Viewer
+from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 WINDOW_RATE = 50.0
@@ -42,10 +46,23 @@ class Performance:
         elbows: elbows on the table; the environment's own number when None.
         start: the environment's `start`.
         size: width and height of its pictures without the label [pixels].
+        arguments: further arguments of the environment.
+        trust: whether a file that may run code when it is read may be read.
     """
 
-    def __init__(self, name: str, env: str, elbows: int | None, start: str, size: tuple[int, int]) -> None:
-        player = find_player(name, elbows, env)
+    def __init__(
+        self,
+        name: str,
+        env: str,
+        elbows: Elbows | None,
+        start: str,
+        size: tuple[int, int],
+        arguments: Mapping[str, Any] = MappingProxyType({}),
+        trust: bool = False,
+    ) -> None:
+        player = find_player(name, elbows, env, arguments, trust)
+        self.settings = player.settings
+        """Arguments of the environment."""
         self._env = ElbowArmVectorEnv(1, **replace(player.settings, start=start).arguments, autoreset_mode="Disabled")
         self._controller = player.make(self._env)
         self._viewer = Viewer(self._env.episodes, "rgb_array", *size, accent=rgb(player.colour))
@@ -104,12 +121,15 @@ def watch(
     names: Sequence[str],
     *,
     env: str = "ElbowArm-v0",
-    elbows: int | None = None,
+    elbows: Elbows | None = None,
+    arguments: Mapping[str, Any] = MappingProxyType({}),
+    trust: bool = False,
     start: str = "paper",
     seed: int = 0,
     speed: float = 1.0,
     size: tuple[int, int] = (640, 480),
     output: Path | None = None,
+    tell: Callable[[Settings], None] | None = None,
 ) -> Path | None:
     """Plays controllers side by side with the same start, in a window until it is closed, or once into a file.
 
@@ -119,11 +139,14 @@ def watch(
         names: names of the controllers.
         env: id of the environment.
         elbows: elbows on the table; the environment's own number when None.
+        arguments: further arguments of the environment.
+        trust: whether files that may run code when they are read may be read.
         start: the environment's `start`.
         seed: seed of the start pose; the window goes on with the next ones.
         speed: simulated time per second of real time [s/s].
         size: width and height of each controller's picture [pixels].
         output: a .gif or .mp4 to write instead of opening a window.
+        tell: called with the first controller's settings before it plays.
 
     Returns:
         The file, if one was written.
@@ -134,14 +157,21 @@ def watch(
     positive("speed", speed)
     if output is not None:
         check_video(output)
-    performances = [Performance(name, env, elbows, start, size) for name in names]
+    performances = [Performance(name, env, elbows, start, size, arguments, trust) for name in names]
+    if tell is not None:
+        tell(performances[0].settings)
     if output is None and display_driver() is not None:
         _into_window(performances, " and ".join(names), seed, speed)
         return None
     if output is None:
-        output = Path("_versus_".join(Path(name).stem for name in names) + ".mp4")
+        output = Path("_versus_".join(_file_name(name) for name in names) + ".mp4")
         print(f"no display: writing {output}", file=sys.stderr)
     return _into_file(performances, seed, speed, output)
+
+
+def _file_name(name: str) -> str:
+    """A controller's name as a part of a file's: its label, or a path's or an import path's last part."""
+    return Path(name.partition("=")[0]).stem.replace(":", "_")
 
 
 def _into_window(performances: Sequence[Performance], title: str, seed: int, speed: float) -> None:

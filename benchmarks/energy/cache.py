@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
+import sys
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.files import write_whole
+from agents.files import read_arrays, write_whole
+from agents.machine import code
 
-ROOT = Path(__file__).parents[2]
-CODE = ("elbow_gym/**/*.py", "agents/control/*.py", "agents/evaluation/*.py", "agents/tasks.py")
-"""Patterns of the files that the results depend on."""
-PICTURES = "rendering"
-"""Folder of elbow_gym that only draws, so that no result depends on it."""
-
+MAY_BE_MISSING = "smallest_elbow_force"
+"""Metric that a run without elbows has as NaN."""
 Results = dict[str, dict[str, NDArray[np.float64]]]
 
 
@@ -29,27 +26,21 @@ def key(question: Mapping[str, Any]) -> str:
     return hashlib.sha256(f"{code()}{text}".encode()).hexdigest()[:32]
 
 
-@cache
-def code() -> str:
-    """Digest of the files of `CODE`."""
-    digest = hashlib.sha256()
-    for pattern in CODE:
-        for path in sorted(ROOT.glob(pattern)):
-            if path.parent.name != PICTURES:
-                digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
 def load(name: str, folder: Path) -> Results | None:
-    """Stored result with a key, or None."""
+    """Stored result with a key; None when there is none, and with a line on stderr when it is damaged."""
     path = folder / f"{name}.npz"
-    if not path.is_file():
-        return None
     results: Results = {}
-    with np.load(path, allow_pickle=False) as arrays:
-        for entry in arrays.files:
-            regime, metric = entry.split("/", 1)
-            results.setdefault(regime, {})[metric] = arrays[entry]
+    try:
+        for entry, array in read_arrays(path).items():
+            regime, _, metric = entry.partition("/")
+            if metric != MAY_BE_MISSING and not np.isfinite(array).all():
+                raise ValueError(f"{path} must hold finite numbers, got {array[~np.isfinite(array)][0]} in {entry}")
+            results.setdefault(regime, {})[metric] = array
+    except FileNotFoundError:
+        return None
+    except ValueError as error:
+        print(f"{error}; it is measured again", file=sys.stderr)
+        return None
     return results
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from agents.evaluation.metrics import REGIMES
 from agents.evaluation.players import ELBOW_COUNTS
-from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES, ELBOW_COLOURS, ELBOW_NAMES, pyplot
-from benchmarks.energy.cells import FEATURED
+from agents.style import ELBOW_COLOURS, elbow_name, look, pyplot
+from benchmarks.energy.cells import featured
 
 if TYPE_CHECKING:
     from benchmarks.energy.rows import Row
@@ -40,14 +40,14 @@ APART = 0.2
 
 
 def figure(rows: Sequence[Row], path: Path) -> None:
-    """Energy and error of `FEATURED` from the paper's pose as points with 95 % intervals, on logarithmic axes.
+    """Energy and error of the `featured` from the paper's pose as points with 95 % intervals, on logarithmic axes.
 
     A line for each controller, the best return with most elbows at the top; colour and marker say the elbow count.
     """
     plt = pyplot()
     from matplotlib.ticker import FixedLocator, NullFormatter, StrMethodFormatter
 
-    chosen = {(row.controller, row.elbows, row.regime): row for row in rows if row.controller in FEATURED}
+    chosen = {(row.controller, row.elbows, row.regime): row for row in rows if featured(row.controller)}
 
     def merit(controller: str) -> float:
         most = max(elbows for name, elbows, _ in chosen if name == controller)
@@ -57,7 +57,7 @@ def figure(rows: Sequence[Row], path: Path) -> None:
     height = 1.5 + 0.4 * max(1, len(controllers))
     fig, axes = plt.subplots(1, len(PANELS), figsize=(10, height), sharey=True, layout="constrained")
     for ax, panel in zip(axes, PANELS, strict=True):
-        for elbows in ELBOW_COUNTS:
+        for elbows in sorted({count for _, count, _ in chosen}, reverse=True):
             shift = APART * (elbows - 1)
             shown = [(k + shift, chosen.get((name, elbows, panel.regime))) for k, name in enumerate(controllers)]
             points = [(k, row.figures[panel.metric]) for k, row in shown if row is not None]
@@ -67,13 +67,13 @@ def figure(rows: Sequence[Row], path: Path) -> None:
                 values,
                 [k for k, _ in points],
                 xerr=spread,
-                fmt=BEARING_MARKERS[elbows],
-                color=ELBOW_COLOURS[elbows],
+                fmt=BEARING_MARKERS.get(elbows, "D"),
+                color=ELBOW_COLOURS.get(elbows, "#000000"),
                 markersize=5.5,
                 capsize=3.5,
                 lw=1.5,
                 zorder=3,
-                label=ELBOW_NAMES[elbows],
+                label=elbow_name(elbows),
             )
         ax.set_xscale("log")
         low, high = ax.get_xlim()
@@ -84,7 +84,7 @@ def figure(rows: Sequence[Row], path: Path) -> None:
         ax.set_title(panel.title, fontsize=11)
         ax.set_xlabel(panel.label, fontsize=11)
         ax.tick_params(labelsize=10)
-    axes[0].set_yticks(range(len(controllers)), [CONTROLLER_NAMES[name] for name in controllers], fontsize=11)
+    axes[0].set_yticks(range(len(controllers)), [look(name)[0] for name in controllers], fontsize=11)
     axes[0].set_ylim(-0.5, len(controllers) - 0.5)
     fig.legend(
         *axes[0].get_legend_handles_labels(),
@@ -114,8 +114,8 @@ def joints(rows: Sequence[Row], path: Path) -> None:
                             places,
                             row.joint_energy,
                             width,
-                            color=CONTROLLER_COLOURS[name],
-                            label=CONTROLLER_NAMES[name],
+                            color=look(name)[1],
+                            label=look(name)[0],
                         )
                         ax.set_xticks(range(1, len(row.joint_energy) + 1))
             # A joint can give energy back; between -1 and 1 J the axis is linear.
@@ -124,7 +124,7 @@ def joints(rows: Sequence[Row], path: Path) -> None:
             ax.set_axisbelow(True)
             ax.axhline(0.0, color="black", lw=0.6)
             if line == 0:
-                ax.set_title(ELBOW_NAMES[elbows])
+                ax.set_title(elbow_name(elbows))
             else:
                 ax.set_xlabel("joint")
         axes[line, 0].set_ylabel(f"electrical energy (J)\n{regime.meaning.split(': ')[-1]}")

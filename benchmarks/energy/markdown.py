@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from agents.evaluation.metrics import UNITS
 from agents.files import write_csv
-from agents.style import CONTROLLER_NAMES, ELBOW_NAMES
-from benchmarks.energy.cells import FEATURED
+from agents.style import elbow_name, look
+from benchmarks.energy.cells import featured
 from benchmarks.energy.statistics import Estimate
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def shown(row: Row) -> tuple[str, ...]:
     figures = row.figures
     force = figures["smallest_elbow_force"].value
     return (
-        CONTROLLER_NAMES.get(row.controller, row.controller),
+        look(row.controller)[0],
         str(row.elbows),
         row.regime,
         with_interval(figures["electrical_energy"]),
@@ -106,7 +106,7 @@ def brief(rows: Sequence[Row]) -> str:
         lines.append(
             (
                 str(key[0]),
-                CONTROLLER_NAMES.get(key[1], key[1]),
+                look(key[1])[0],
                 with_interval(whole.figures["return"]),
                 "" if whole.gap is None else percent(whole.gap),
                 with_interval(whole.figures["electrical_energy"]),
@@ -120,18 +120,18 @@ def brief(rows: Sequence[Row]) -> str:
 
 
 def short(rows: Sequence[Row]) -> str:
-    """A line for each of `FEATURED`, the best return with most elbows first: regime A at every elbow count."""
-    places = by_player([row for row in rows if row.controller in FEATURED])
+    """A line for each `featured` controller, the best return with most elbows first: regime A at every elbow count."""
+    places = by_player([row for row in rows if featured(row.controller)])
     counts = list(dict.fromkeys(elbows for elbows, _ in places))
-    header = ["controller", *(f"energy A, {ELBOW_NAMES[elbows]} (J)" for elbows in counts)]
-    header += [*(f"gap A, {ELBOW_NAMES[elbows]}" for elbows in counts), f"error B, {ELBOW_NAMES[counts[0]]} (mm)"]
+    header = ["controller", *(f"energy A, {elbow_name(elbows)} (J)" for elbows in counts)]
+    header += [*(f"gap A, {elbow_name(elbows)}" for elbows in counts), f"error B, {elbow_name(counts[0])} (mm)"]
     lines = [tuple(header)]
     for controller in (name for elbows, name in places if elbows == counts[0]):
         of = [places[elbows, controller] for elbows in counts if (elbows, controller) in places]
         energies = [significant(regimes["A"].figures["electrical_energy"].value) for regimes in of]
         gaps = ["" if regimes["A"].gap is None else percent(regimes["A"].gap) for regimes in of]
         error = significant(of[0]["B"].figures["error_rms"].value)
-        lines.append((CONTROLLER_NAMES[controller], *energies, *gaps, error))
+        lines.append((look(controller)[0], *energies, *gaps, error))
     return _pipes(lines)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from agents.files import write_csv
-from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES, ELBOW_NAMES, pyplot
+from agents.style import CONTROLLER_COLOURS, elbow_name, look, pyplot
 from benchmarks.optimal import cached, cells
 
 if TYPE_CHECKING:
@@ -83,15 +83,16 @@ def figure(places: Sequence[Mark], path: Path) -> None:
             colour = CONTROLLER_COLOURS["pd"]
             ax.plot(*zip(*line, strict=True), ":", color=colour, marker=".", label="PD, 24 V, gains x 1/4 to 4")
         for mark in (mark for mark in places if mark.elbows == elbows and mark.gain == 1.0):
+            name, colour, marker = look(mark.controller)
             ax.plot(
                 mark.error,
                 mark.energy,
-                CONTROLLER_MARKERS[mark.controller],
-                color=CONTROLLER_COLOURS[mark.controller],
+                marker,
+                color=colour,
                 markeredgecolor="black",
                 markeredgewidth=0.5,
                 markersize=9 if mark.controller == "lqr" else 7,
-                label=CONTROLLER_NAMES[mark.controller],
+                label=name,
             )
         ax.set_xscale("log")
         ax.set_yscale("log")
@@ -99,7 +100,7 @@ def figure(places: Sequence[Mark], path: Path) -> None:
             axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axis.set_major_formatter(StrMethodFormatter("{x:g}"))
             axis.set_minor_formatter(NullFormatter())
-        ax.set_title(ELBOW_NAMES[elbows])
+        ax.set_title(elbow_name(elbows))
         ax.set_xlabel("mean tracking error, 0-5 s (mm)")
     axes[0, 0].set_ylabel("electrical energy, 0-5 s (J)")
     named = {}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
@@ -14,23 +14,28 @@ from typing import Any
 
 import numpy as np
 
+from agents.evaluation.guest import Guest
 from agents.evaluation.metrics import REGIMES, UNITS
-from agents.evaluation.players import Player
+from agents.evaluation.player import Player
+from agents.evaluation.players import ELBOW_COUNTS
 from agents.evaluation.regimes import BENCHMARK_SEEDS, SHIFTED, in_all_regimes
-from agents.files import write_text, write_whole
+from agents.files import check_writable, write_text, write_whole
+from agents.machine import machine, versions
+from agents.tasks import plain_arguments
 from agents.workers import Job, Tell, compile_before, counted, in_processes
 from benchmarks import learning
 from benchmarks.blocks import publish_blocks
-from benchmarks.energy import breakdown, cache, pareto, terminal
+from benchmarks.energy import breakdown, cache, effort, pareto, terminal
 from benchmarks.energy import figures as energy_figure
 from benchmarks.energy import markdown as energy_table
 from benchmarks.energy.cache import Results
-from benchmarks.energy.cells import PARTS, Cell, cells, players, sweep, work
+from benchmarks.energy.cells import PARTS, Cell, cells, guest_cells, own_arm_cells, players, sweep, work
 from benchmarks.energy.rows import Row
 from benchmarks.energy.statistics import center, interquartile_mean
-from benchmarks.machine import CACHE, LATEST, PACKAGES, RESULTS, machine, versions
+from benchmarks.machine import CACHE, LATEST, PACKAGES, RESULTS
 from benchmarks.optimal import Cell as Bound
 from benchmarks.optimal import cached as cached_bound
+from elbow_gym.task.settings import Settings
 
 FEW = 3
 """Start poses of a short run. With both starts side by side they fit into one block of the kernel."""
@@ -64,8 +69,20 @@ def plan(full: bool, episodes: int | None = None, **more: Any) -> Plan:
 def bound(cell: Cell, regime: str) -> float | None:
     """The best known negative return from the start without noise; None where none was sought."""
     chosen = next(one for one in REGIMES if one.name == regime)
-    figures = cached_bound(Bound(cell.elbows, chosen.start)) if chosen.since == 0.0 else None
-    return None if figures is None or cell.part != "nominal" else float(figures["closed_loop"])
+    if chosen.since > 0.0 or cell.part != "nominal" or not _of_the_bound(cell):
+        return None
+    figures = cached_bound(Bound(cell.elbows, chosen.start))
+    return None if figures is None else float(figures["closed_loop"])
+
+
+def _of_the_bound(cell: Cell) -> bool:
+    """Whether a cell's players have the arm, the circle, the load and the reward that the bound is for."""
+    if cell.guest is None:
+        return not cell.arguments
+    free = ("control_frequency", "timestep", "integrator", "voltage_limit", "action_unit", "start", "start_noise")
+    own, papers = players(cell)[0].settings, Settings(elbows=cell.elbows)
+    alike = replace(own, **{name: getattr(papers, name) for name in free})
+    return plain_arguments(alike) == plain_arguments(papers)
 
 
 def stored(cell: Cell, plan: Plan) -> list[Results] | None:
@@ -74,7 +91,7 @@ def stored(cell: Cell, plan: Plan) -> list[Results] | None:
         return None
     found = []
     for player in players(cell, plan.every_seed):
-        results = cache.load(_key(cell, player, plan), plan.folder)
+        results = cache.load(_key(cell, player, plan), plan.folder) if player.identity else None
         if results is None:
             return None
         found.append(results)
@@ -90,10 +107,11 @@ def play(cell: Cell, plan: Plan, tell: Tell) -> list[Results]:
     measured = []
     for player in players(cell, plan.every_seed):
         name = _key(cell, player, plan)
-        results = None if plan.fresh else cache.load(name, plan.folder)
+        results = None if plan.fresh or not player.identity else cache.load(name, plan.folder)
         if results is None:
             results = in_all_regimes(player, plan.seeds, counted(starts * player.work, tell), cell.regimes)
-            cache.store(name, results, plan.folder)
+            if player.identity:
+                cache.store(name, results, plan.folder)
         else:
             tell(starts * player.work)
         measured.append(results)
@@ -102,7 +120,7 @@ def play(cell: Cell, plan: Plan, tell: Tell) -> list[Results]:
 
 def _key(cell: Cell, player: Player, plan: Plan) -> str:
     question = {
-        "settings": player.settings.arguments,
+        "settings": plain_arguments(player.settings),
         "identity": player.identity,
         "seeds": list(plan.seeds),
         "regimes": [regime.name for regime in cell.regimes],
@@ -232,6 +250,9 @@ def energy(
     folder: Path = CACHE,
     parallel: bool = True,
     command: str = "",
+    guests: Sequence[Guest] = (),
+    elbows: int | None = None,
+    arguments: Mapping[str, Any] | None = None,
 ) -> list[Row]:
     """Runs the comparison, writes the results and prints the report. Returns the rows.
 
@@ -244,12 +265,30 @@ def energy(
         folder: where results of single cells are kept.
         parallel: one cell on each core.
         command: the command line, for energy.json.
+        guests: players of the user's own, which play the nominal part.
+        elbows: the only elbow count that is compared; all when None.
+        arguments: arguments of a user's own environment, the elbows among them, in which the classical controllers play
+            instead of all players in the default one.
+
+    Raises:
+        ValueError: own players or an own environment would be published, or a guest plays nowhere.
     """
     started = time.monotonic()
+    if publish and (guests or arguments or elbows is not None):
+        raise ValueError("--publish must be given without --with, --elbows, --arm and --environment")
     chosen = plan(full or publish, episodes, folder=folder, fresh=fresh)
+    if arguments is not None:
+        chosen = replace(chosen, cells=own_arm_cells(arguments, guests), every_seed=False)
+    else:
+        counts = ELBOW_COUNTS if elbows is None else (elbows,)
+        shown = [cell for cell in chosen.cells if elbows is None or cell.elbows == elbows]
+        chosen = replace(chosen, cells=[*shown, *guest_cells(guests, counts)])
     output = RESULTS if publish else output
+    for place in (output, folder):
+        check_writable(place)
     rows = measure(chosen, parallel)
     save(rows, chosen, time.monotonic() - started, output, command)
+    effort.save(chosen.cells, output / "effort.csv")
     changed = publish_blocks(output) if publish else []
     print(terminal.report(rows, len(chosen.seeds), chosen.every_seed, [output, *changed]))
     return rows

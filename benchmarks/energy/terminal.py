@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from agents.evaluation.metrics import REGIMES
-from agents.style import ELBOW_NAMES, look
+from agents.style import elbow_name, look
 from benchmarks.energy.cells import PARTS
 from benchmarks.energy.markdown import by_player, percent, significant
 from benchmarks.energy.rows import Row
@@ -51,14 +51,13 @@ def table(rows: Sequence[Row]) -> str:
     below = "".join(f"{', '.join(filter(None, (c.regime, c.unit))):>{COLUMN_WIDTH}}" for c in columns)
     lines = []
     for elbows in dict.fromkeys(count for count, _ in grouped):
-        name = "the table" if rows[0].part == "table" else ELBOW_NAMES[elbows]
+        name = "the table" if rows[0].part == "table" else elbow_name(elbows)
         lines += ["", f"{name:<{LABEL_WIDTH}}{head}".rstrip(), f"{'':<{LABEL_WIDTH}}{below}"]
         for (count, controller), of in grouped.items():
             if count == elbows:
                 cells = (column.figure(of[column.regime]) for column in columns)
-                lines.append(
-                    f"  {look(controller)[0]:<{LABEL_WIDTH - 2}}" + "".join(f"{c:>{COLUMN_WIDTH}}" for c in cells)
-                )
+                label = look(controller)[0][: LABEL_WIDTH - 1]
+                lines.append(f"  {label:<{LABEL_WIDTH - 2}}" + "".join(f"{c:>{COLUMN_WIDTH}}" for c in cells))
     return "\n".join(lines[1:])
 
 
@@ -104,7 +103,9 @@ def report(rows: Sequence[Row], poses: int, every_seed: bool, written: Sequence[
         f"Files: {', '.join(_short(path) for path in written)}",
     ]
     if not every_seed:
-        sentences[-1] += " (energy.csv, energy.md, energy.png). All parts, poses and training seeds: --full."
+        sentences[-1] += (
+            " (energy.csv, energy.md, energy.png, effort.csv). All parts, poses and training seeds: --full."
+        )
     return "\n\n".join(parts + [textwrap.fill(text, WIDTH, break_long_words=False) for text in sentences if text])
 
 

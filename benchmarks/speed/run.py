@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from agents.files import write_csv, write_text, write_whole
+from agents.machine import machine, versions
 from agents.workers import compile_before
 from benchmarks.blocks import publish_blocks
-from benchmarks.machine import LATEST_SPEED, PACKAGES, RESULTS, machine, versions
+from benchmarks.machine import LATEST_SPEED, PACKAGES, RESULTS
 from benchmarks.speed import markdown
 from benchmarks.speed.environments import environment_contenders
 from benchmarks.speed.own import Contender, Sampler, compilations, own_contenders

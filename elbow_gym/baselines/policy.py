@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from elbow_gym.baselines.policy_card import PolicyCard, read_card
 from elbow_gym.baselines.tasks import task_name
-from elbow_gym.interface import Environment, Interface
+from elbow_gym.env import ElbowArmEnv
+from elbow_gym.interface import Interface
 from elbow_gym.task.observation import OBSERVATION_VERSION
 from elbow_gym.task.settings import Settings
+from elbow_gym.vector_env import ElbowArmVectorEnv
 
 BASELINES = Path(__file__).parent / "policies"
 """Folder of the baselines: the best training seed of each algorithm and task, ALGORITHM[_LABEL]_TASK_seedK."""
-FORMAT = 1
 Weights = dict[str, NDArray[np.float32]]
 Layer = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
@@ -33,40 +34,6 @@ OUTPUTS: dict[str, Layer] = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np
 """Functions that turn the last layer into an action: PPO's is clipped, SAC's squashed."""
 
 
-@dataclass(frozen=True)
-class PolicyCard:
-    """Everything about a policy but its weights."""
-
-    algorithm: str
-    """Name of the algorithm, such as "ppo"."""
-    environment: dict[str, Any]
-    """Arguments of the environment in training, the fields of `Settings`, JSON types only."""
-    observation: tuple[str, ...]
-    """Names and units of the observation's entries."""
-    layers: tuple[int, ...]
-    """Numbers of units in the layers, from the observation to the action."""
-    activation: str
-    """Activation function between the layers, one of `ACTIVATIONS`."""
-    command: str
-    """Command line that trained the policy."""
-    env: str = "ElbowArm-v0"
-    """Gymnasium id of the environment in training."""
-    output: str = "clip"
-    """Function after the last layer, one of `OUTPUTS`."""
-    digest: str = ""
-    """SHA-256 of the weights; filled in when empty."""
-    observation_version: int = OBSERVATION_VERSION
-    """Version of the observation's entries in training."""
-    format: int = FORMAT
-    """Version of the files' format."""
-    training: dict[str, Any] = field(default_factory=dict[str, Any])
-    """Settings, seed and length of the training, JSON types only."""
-    evaluation: dict[str, Any] = field(default_factory=dict[str, Any])
-    """Metrics by name at the evaluation that chose the policy."""
-    versions: dict[str, str] = field(default_factory=dict[str, str])
-    """Versions of the libraries by name."""
-
-
 class Policy:
     """A deterministic multilayer perceptron with SB3's `predict`.
 
@@ -75,33 +42,36 @@ class Policy:
         weights: `weight_k` (out, in) and `bias_k` (out,) of every layer k.
 
     Raises:
-        ValueError: the card and the weights do not fit each other.
+        ValueError: the card and the weights do not fit each other, a weight is not finite, or no environment has the
+            card's arguments.
     """
 
-    def __init__(self, card: PolicyCard, weights: Mapping[str, NDArray[np.float32]]) -> None:
-        if card.format != FORMAT:
-            raise ValueError(f"format of the policy must be {FORMAT}, got {card.format}")
+    def __init__(self, card: PolicyCard, weights: Mapping[str, NDArray[np.floating[Any]]]) -> None:
         for name, known in (("activation", ACTIVATIONS), ("output", OUTPUTS)):
             if getattr(card, name) not in known:
                 raise ValueError(f"{name} must be one of {sorted(known)}, got {getattr(card, name)!r}")
-        for k, (size, after) in enumerate(zip(card.layers[:-1], card.layers[1:], strict=True)):
-            for name, shape in ((f"weight_{k}", (after, size)), (f"bias_{k}", (after,))):
-                if name not in weights or weights[name].shape != shape:
-                    got = weights[name].shape if name in weights else "nothing"
-                    raise ValueError(f"{name} must have shape {shape}, got {got}")
-        digest = digest_of(weights)
+        self.weights: Weights = _checked_weights(card, weights)
+        try:
+            self._settings = Settings(**card.environment)
+        except TypeError as error:
+            raise ValueError(f"environment of the policy must be arguments of one, got {card.environment}") from error
+        digest = digest_of(card, self.weights)
         if card.digest not in ("", digest):
-            raise ValueError(f"weights must be those of the card, with the digest {card.digest}, got {digest}")
+            raise ValueError(f"weights and card must be those of the digest {card.digest}, got {digest}")
         self.card = replace(card, digest=digest)
-        self.weights: Weights = dict(weights)
 
-    def check(self, env: Environment) -> None:
-        """Raises ValueError when the environment's observation or action is not the one of the training."""
+    def check(self, env: Any) -> None:
+        """Raises ValueError when an environment's observation or action is not the one of the training.
+
+        Args:
+            env: an environment of this package, single or batched, also under wrappers, `SB3VecEnv` or a vector
+                environment that holds its parts in this process.
+        """
         if self.card.observation_version != OBSERVATION_VERSION:
             raise ValueError(
                 f"observation_version of the policy must be {OBSERVATION_VERSION}, got {self.card.observation_version}"
             )
-        interface = Interface(env)
+        interface = Interface(_own_environment(env))
         names = interface.layout.names
         if self.card.observation != names:
             raise ValueError(
@@ -113,23 +83,39 @@ class Policy:
             if trained != found:
                 raise ValueError(f"{name} of the environment must be {trained!r} as in training, got {found!r}")
 
+    def acting_in(self, env: Any) -> Policy:
+        """This policy as the controller of an environment. Argument and errors of `check`."""
+        self.check(env)
+        return self
+
     @property
     def settings(self) -> Settings:
         """Settings of the environment in training."""
-        return Settings(**self.card.environment)
+        return self._settings
 
     def predict(
         self, observation: NDArray[np.float32], *_args: Any, **_kwargs: Any
     ) -> tuple[NDArray[np.float32], None]:
-        """Actions (..., n) in [-1, 1] for observations (..., size)."""
+        """Actions (..., n) in [-1, 1] for observations (..., size).
+
+        Raises:
+            ValueError: observations have another size, are not finite, or are so large that float32 overflows.
+        """
         x = np.asarray(observation, dtype=np.float32)
-        if x.shape[-1] != self.card.layers[0]:
-            raise ValueError(f"observation must have {self.card.layers[0]} entries, got {x.shape[-1]}")
+        if x.ndim == 0 or x.shape[-1] != self.card.layers[0]:
+            got = x.shape[-1] if x.ndim else "a scalar"
+            raise ValueError(f"observation must have {self.card.layers[0]} entries, got {got}")
+        if not np.isfinite(x).all():
+            raise ValueError(f"observation must be finite, got {x[~np.isfinite(x)][0]}")
         activation, last = ACTIVATIONS[self.card.activation], len(self.card.layers) - 2
-        for k in range(last + 1):
-            x = x @ self.weights[f"weight_{k}"].T + self.weights[f"bias_{k}"]
-            x = activation(x) if k < last else x
-        return OUTPUTS[self.card.output](x).astype(np.float32, copy=False), None
+        with np.errstate(over="ignore", invalid="ignore"):
+            for k in range(last + 1):
+                x = x @ self.weights[f"weight_{k}"].T + self.weights[f"bias_{k}"]
+                x = activation(x) if k < last else x
+            action = OUTPUTS[self.card.output](x).astype(np.float32, copy=False)
+        if np.isnan(action).any():
+            raise ValueError(f"observation must not overflow float32, got {np.abs(observation).max()} in it")
+        return action, None
 
     def module(self) -> Any:
         """The network as a `torch.nn.Sequential` that maps observations to actions, to train further."""
@@ -147,13 +133,43 @@ class Policy:
         return torch.nn.Sequential(*layers)
 
 
-def digest_of(weights: Mapping[str, NDArray[np.float32]]) -> str:
-    """SHA-256 of the weights, name by name."""
-    digest = hashlib.sha256()
+def digest_of(card: PolicyCard, weights: Mapping[str, NDArray[np.float32]]) -> str:
+    """SHA-256 of the card's deciding entries and of the weights, name by name."""
+    digest = hashlib.sha256(card.deciding.encode())
     for name in sorted(weights):
         digest.update(name.encode())
         digest.update(np.ascontiguousarray(weights[name], dtype="<f4").tobytes())
     return digest.hexdigest()
+
+
+def _checked_weights(card: PolicyCard, weights: Mapping[str, NDArray[np.floating[Any]]]) -> Weights:
+    """Float32 weights in C order, as files hold them. Raises ValueError naming a weight that does not fit the card."""
+    checked: Weights = {}
+    for k, (size, after) in enumerate(zip(card.layers[:-1], card.layers[1:], strict=True)):
+        for name, shape in ((f"weight_{k}", (after, size)), (f"bias_{k}", (after,))):
+            if name not in weights or weights[name].shape != shape:
+                got = weights[name].shape if name in weights else "nothing"
+                raise ValueError(f"{name} must have shape {shape}, got {got}")
+            if weights[name].dtype.kind != "f":
+                raise ValueError(f"{name} must be floating-point numbers, got {weights[name].dtype}")
+            checked[name] = np.array(weights[name], dtype=np.float32, order="C")
+            if not np.isfinite(checked[name]).all():
+                raise ValueError(f"{name} must be finite, got {checked[name][~np.isfinite(checked[name])][0]}")
+    if more := sorted(set(weights) - set(checked)):
+        raise ValueError(f"weights must be those of {len(card.layers) - 1} layers, got {more[0]!r}, too")
+    return checked
+
+
+def _own_environment(env: Any) -> ElbowArmEnv | ElbowArmVectorEnv:
+    """The environment of this package under wrappers, adapters and vector environments of this process."""
+    found = env
+    while not isinstance(found, (ElbowArmEnv, ElbowArmVectorEnv)):
+        # Wrappers and SB3VecEnv hold the next one as `env`, SB3's wrappers as `venv`, vector environments as `envs`.
+        parts = (*(getattr(found, name, None) for name in ("env", "venv")), *(getattr(found, "envs", None) or ())[:1])
+        found = next((part for part in parts if part is not None), None)
+        if found is None:
+            raise ValueError(f"env must hold an environment of elbow_gym in this process, got {env}")
+    return found
 
 
 def load_policy(source: str | Path, elbows: int | None = None, env: str | None = None) -> Policy:
@@ -184,8 +200,9 @@ def read_policy(path: Path) -> Policy:
     """The policy in a pair of files, named with or without either's suffix.
 
     Raises:
-        ValueError: a file is missing, or they do not fit each other.
+        ValueError: a file is missing, cut or altered, or they do not fit each other.
     """
+    from safetensors import SafetensorError
     from safetensors.numpy import load_file  # pyright: ignore[reportUnknownVariableType]
 
     card_path, weights_path = pair(path)
@@ -194,13 +211,13 @@ def read_policy(path: Path) -> Policy:
             raise ValueError(
                 f"policy must be one of {baseline_names()} or the path of a pair of files, got no {needed}"
             )
+    card = read_card(card_path)
     try:
-        plain: dict[str, Any] = json.loads(card_path.read_text(encoding="utf-8"))
-        plain |= {name: tuple(plain[name]) for name in ("layers", "observation")}
-        card = PolicyCard(**plain)
-    except (TypeError, KeyError, json.JSONDecodeError) as error:
-        raise ValueError(f"policy card must hold the fields of PolicyCard, got {card_path}: {error}") from error
-    return Policy(card, cast("Weights", load_file(weights_path)))
+        weights = cast("Weights", load_file(weights_path))
+    # safetensors' own error, and those of a header that names what NumPy lacks.
+    except (SafetensorError, KeyError, ValueError, TypeError, AttributeError) as error:
+        raise ValueError(f"policy weights must be whole safetensors, got {weights_path}: {error}") from error
+    return Policy(card, weights)
 
 
 def baseline_names() -> list[str]:

@@ -17,8 +17,14 @@ def registered_arguments(env: str) -> dict[str, Any]:
     return dict(spec(env).kwargs)
 
 
-def task_name(env: str, elbows: int | None = None) -> str:
-    """Short name of a task: "elbows0", "elbows1", "elbows2", "table", "random"; others as "random_elbows1"."""
+def task_name(env: str, elbows: int | tuple[int, ...] | None = None) -> str:
+    """Short name of a task: "elbows0", "elbows1", "elbows2", "table", "random"; others as "random_elbows1".
+
+    Elbows by their joints, such as (4, 7), make "joints4_7".
+    """
+    if isinstance(elbows, tuple):
+        joints = "joints" + "_".join(map(str, elbows))
+        return joints if env == "ElbowArm-v0" else f"{ENVIRONMENTS[env]}_{joints}"
     given = registered_arguments(env).get("elbows", 2)
     count = given if elbows is None else elbows
     if env == "ElbowArm-v0":

@@ -13,7 +13,7 @@ from elbow_gym.kernel.template import template
 
 
 @template(inlined=True)
-def meter(ws, here, k, weight):
+def meter(ws, here, weight):
     """Adds `weight` seconds of a joint's powers to its meters, and keeps its net voltage.
 
     Copper loss and link work take here what differs from them by the changes of L i^2 / 2 and of J q_dot^2 / 2 alone:
@@ -25,27 +25,27 @@ def meter(ws, here, k, weight):
         LOSS, GEAR, SHARE.
     Writes: ELECTRICAL, DRAWN, COPPER, FRICTION, WORK, NET, CONTACT_LOSS.
     """
-    q_dot = ws[here + Q_DOT + k]
-    i = ws[here + CURRENT + k]
-    v = ws[here + VOLTAGE + k]
+    q_dot = ws[here + Q_DOT]
+    i = ws[here + CURRENT]
+    v = ws[here + VOLTAGE]
     if DRIVE:
-        v *= ws[here + SHARE + k]
-    back_emf = ws[here + KM + k] * q_dot
-    friction = ws[here + DAMPING + k] * q_dot
-    gear_loss = ws[here + MOTOR_DAMPING + k] * q_dot
+        v *= ws[here + SHARE]
+    back_emf = ws[here + KM] * q_dot
+    friction = ws[here + DAMPING] * q_dot
+    gear_loss = ws[here + MOTOR_DAMPING] * q_dot
     if DRIVE:
-        friction += ws[here + GEAR + k]
-        gear_loss += ws[here + GEAR + k]
+        friction += ws[here + GEAR]
+        gear_loss += ws[here + GEAR]
     power = v * i
     converted = back_emf * i
-    ws[here + NET + k] = v - back_emf
-    ws[here + ELECTRICAL + k] += weight * power
-    ws[here + DRAWN + k] += weight * max(power, 0.0)
-    ws[here + COPPER + k] += weight * (power - converted)
-    ws[here + FRICTION + k] += weight * (friction * q_dot)
-    ws[here + WORK + k] += weight * (converted - gear_loss * q_dot)
+    ws[here + NET] = v - back_emf
+    ws[here + ELECTRICAL] += weight * power
+    ws[here + DRAWN] += weight * max(power, 0.0)
+    ws[here + COPPER] += weight * (power - converted)
+    ws[here + FRICTION] += weight * (friction * q_dot)
+    ws[here + WORK] += weight * (converted - gear_loss * q_dot)
     if TABLE or RUBBING:
-        ws[here + CONTACT_LOSS + k] += weight * ws[here + LOSS + k]
+        ws[here + CONTACT_LOSS] += weight * ws[here + LOSS]
 
 
 @template
@@ -56,56 +56,58 @@ def accelerate(ws, n, weight):
         SUPPLY_LOSS, SAG, BUS_FLOOR, TWIST, BUS, SHARE, IR3, IZ3, R, AR, AZ, ALPHA.
     Writes: Q_DDOT, SUPPLY_LOSS, SHARE, AR, AZ, ALPHA.
     """
-    end = U((n - 1) * STRIDE)
+    tip = U((n - 1) * STRIDE)
     # A loop of its own: whether rows of the tip and of the base overlap shows only at run time, and with all rows of
     # `meter` in the loop LLVM gives up on testing for that and leaves it scalar.
     for k in range(LANES):
-        payload = ws[end + PAYLOAD + k]
-        rho = ws[end + RHO + k]
-        inertia = ws[end + YAW_INERTIA + k] + payload * rho * rho + ws[ROTOR + k]
-        rate = ws[end + YAW_INERTIA_RATE + k] + 2.0 * payload * rho * ws[end + RHO_DOT + k]
+        end = tip + k
+        payload = ws[end + PAYLOAD]
+        rho = ws[end + RHO]
+        inertia = ws[end + YAW_INERTIA] + payload * rho * rho + ws[ROTOR + k]
+        rate = ws[end + YAW_INERTIA_RATE] + 2.0 * payload * rho * ws[end + RHO_DOT]
         u = ws[KM + k] * ws[CURRENT + k] - ws[DAMPING + k] * ws[Q_DOT + k]
         if TABLE or RUBBING:
-            u += ws[end + TWIST + k]
+            u += ws[end + TWIST]
         if DRIVE:
-            u -= gear_friction(ws, U(0), k)
-            drawn = max(ws[end + BUS + k], ws[BUS_FLOOR + k])
+            u -= gear_friction(ws, k)
+            drawn = max(ws[end + BUS], ws[BUS_FLOOR + k])
             ws[SHARE + k] = 1.0 - ws[SAG + k] * drawn
             ws[SUPPLY_LOSS + k] += weight * (ws[SAG + k] * drawn * drawn)
         ws[Q_DDOT + k] = (u - rate * ws[Q_DOT + k]) / inertia
     for k in range(LANES):
-        meter(ws, U(0), k, weight)
+        meter(ws, k, weight)
     for a in range(1, n):
-        here = U(a * STRIDE)
-        parent = here - NEXT
+        record = U(a * STRIDE)
         for k in range(LANES):
+            here = record + k
+            parent = here - NEXT
             if DRIVE:
-                ws[here + SHARE + k] = ws[parent + SHARE + k]
-            ar = ws[parent + AR + k]
-            az = ws[parent + AZ + k]
-            before = ws[parent + ALPHA + k]
-            reaction = ws[here + IR3 + k] * ar + ws[here + IZ3 + k] * az
-            alpha = ws[here + D + k] * ((ws[here + R + k] + ws[here + ROTOR + k] * before) - reaction)
-            ws[here + ALPHA + k] = alpha
-            ws[here + AR + k] = ar + ws[here + ER + k] * alpha
-            ws[here + AZ + k] = az + ws[here + EZ + k] * alpha
-            ws[here + Q_DDOT + k] = alpha - before
-            meter(ws, here, k, weight)
+                ws[here + SHARE] = ws[parent + SHARE]
+            ar = ws[parent + AR]
+            az = ws[parent + AZ]
+            before = ws[parent + ALPHA]
+            reaction = ws[here + IR3] * ar + ws[here + IZ3] * az
+            alpha = ws[here + D] * ((ws[here + R] + ws[here + ROTOR] * before) - reaction)
+            ws[here + ALPHA] = alpha
+            ws[here + AR] = ar + ws[here + ER] * alpha
+            ws[here + AZ] = az + ws[here + EZ] * alpha
+            ws[here + Q_DDOT] = alpha - before
+            meter(ws, here, weight)
 
 
-@template(inlined=True)
-def close_meters(ws, here, k):
+@template(flat=True)
+def close_meters(ws, here):
     """Takes off a joint's meters what the step has stored in the inductance and in the rotor.
 
     Reads: Q_DOT, CURRENT, Q_DOT0, CURRENT0, COPPER, WORK, ROTOR, INVERSE_L.
     Writes: COPPER, WORK.
     """
-    i = ws[here + CURRENT + k]
-    i0 = ws[here + CURRENT0 + k]
-    q_dot = ws[here + Q_DOT + k]
-    q_dot0 = ws[here + Q_DOT0 + k]
-    ws[here + COPPER + k] -= 0.5 / ws[here + INVERSE_L + k] * (i * i - i0 * i0)
-    ws[here + WORK + k] -= 0.5 * ws[here + ROTOR + k] * (q_dot * q_dot - q_dot0 * q_dot0)
+    i = ws[here + CURRENT]
+    i0 = ws[here + CURRENT0]
+    q_dot = ws[here + Q_DOT]
+    q_dot0 = ws[here + Q_DOT0]
+    ws[here + COPPER] -= 0.5 / ws[here + INVERSE_L] * (i * i - i0 * i0)
+    ws[here + WORK] -= 0.5 * ws[here + ROTOR] * (q_dot * q_dot - q_dot0 * q_dot0)
 
 
 @template(inlined=True)

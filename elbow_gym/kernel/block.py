@@ -10,7 +10,8 @@ from elbow_gym.kernel.rows import (
 )  # fmt: skip
 from elbow_gym.kernel.sine import sincos
 from elbow_gym.kernel.slots import (
-    ASTRAY, AXIAL, AZ, BELOW, CONTACT_LOSS, COPPER, CURRENT, DRIVE, ELECTRICAL, FORCES, FRICTION, LENGTH, LOWEST_Z,
+    ASTRAY, AXIAL, AZ, BELOW, CONTACT_LOSS, COPPER, CURRENT, DRIVE, ELECTRICAL, FORCES, FRICTION, LANES, LENGTH,
+    LOWEST_Z,
     PSI_DOT, Q, Q_DOT, RHO, RUBBING, SHARED_ROWS, SPIN, STIFFNESS, STRIDE, SUMZ, SUPPLY_LOSS, TABLE, TEMPERATURE, U,
     VOLTAGE, W, WORK, YAW_INERTIA, Z,
 )  # fmt: skip
@@ -31,17 +32,15 @@ def gather(ws, n, start, state, parameters, voltage):
     """Lanes from arms start, start + 1, ...; lanes past the last arm repeat it and are never stored.
 
     Reads: Q_DOT, AXIAL.
-    Writes: ELECTRICAL, VOLTAGE, LENGTH, SPIN, YAW_INERTIA, LOWEST_Z, CONTACT_LOSS, STIFFNESS, PSI_DOT.
+    Writes: VOLTAGE, LENGTH, SPIN, YAW_INERTIA, LOWEST_Z, CONTACT_LOSS, STIFFNESS, PSI_DOT.
     """
     last = state.shape[0] - 1
+    # Lanes innermost: they are stored side by side.
     for a in range(n):
         here = U(a * STRIDE)
-        for row in range(3):
+        for row in range(STATE_ROWS):
             for lane in range(W):
                 ws[here + U(row * W + lane)] = state[min(start + lane, last), row, a]
-        for row in range(5):
-            for lane in range(W):
-                ws[here + ELECTRICAL + U(row * W + lane)] = state[min(start + lane, last), 3 + row, a]
         for lane in range(W):
             ws[here + VOLTAGE + U(lane)] = voltage[min(start + lane, last), a]
         for row in range(PLAIN_PARAMETER_ROWS):
@@ -55,8 +54,7 @@ def gather(ws, n, start, state, parameters, voltage):
                 for lane in range(W):
                     offset = STIFFNESS + U(row * W + lane)
                     ws[here + offset] = parameters[min(start + lane, last), PLAIN_PARAMETER_ROWS + row, a]
-    for lane in range(W):
-        k = U(lane)
+    for k in range(LANES):
         ws[SPIN + k] = ws[Q_DOT + k] * ws[Q_DOT + k]
         if TABLE:
             ws[PSI_DOT + k] = ws[Q_DOT + k]
@@ -74,7 +72,7 @@ def scatter(ws, shared, n, lane, elbows, out, summary):
     k = U(lane)
     valid = True
     for a in range(n):
-        here = U(a * STRIDE + lane)
+        here = U(a * STRIDE) + k
         # Not-a-number and infinity fail the comparison or turn the product into not-a-number.
         meters = ws[here + ELECTRICAL] + ws[here + COPPER] + ws[here + FRICTION] + ws[here + WORK]
         if TABLE or RUBBING or DRIVE:
@@ -84,11 +82,9 @@ def scatter(ws, shared, n, lane, elbows, out, summary):
     if not valid:
         return False
     for a in range(n):
-        here = U(a * STRIDE + lane)
-        for row in range(3):
+        here = U(a * STRIDE) + k
+        for row in range(STATE_ROWS):
             out[row, a] = ws[here + U(row * W)]
-        for row in range(5):
-            out[3 + row, a] = ws[here + ELECTRICAL + U(row * W)]
         if TABLE or RUBBING or DRIVE:
             for row in range(SWITCHED_STATE_ROWS - STATE_ROWS):
                 out[STATE_ROWS + row, a] = ws[here + CONTACT_LOSS + U(row * W)]
@@ -101,7 +97,7 @@ def scatter(ws, shared, n, lane, elbows, out, summary):
     summary[BELOW_TABLE] += shared[BELOW + k]
     summary[RESIDUAL] = shared[ASTRAY + k]
     for j in range(elbows.size):
-        elbow = U((elbows[j] - 2) * STRIDE + lane)
+        elbow = U((elbows[j] - 2) * STRIDE) + k
         summary[RESIDUAL] = max(summary[RESIDUAL], abs(ws[elbow + AZ] + ws[elbow + SUMZ]))
         summary[SUMMARY_COLUMNS + j] = shared[FORCES + U(j * W) + k]
     return True

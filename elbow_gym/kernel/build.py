@@ -7,9 +7,13 @@ from functools import cache
 from threading import Timer
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from elbow_gym.kernel import control, entries
 from elbow_gym.kernel.slots import offsets
 from elbow_gym.kernel.template import Entry, compiled, instances, sources
+from elbow_gym.parameters import Array
 
 PATIENCE = 2.0
 """Compilations that take longer [s] are announced."""
@@ -18,11 +22,27 @@ PATIENCE = 2.0
 class Kernel(NamedTuple):
     """The compiled entries for one lane count and one set of switches."""
 
-    advance: Entry
     control_step: Entry
-    refresh: Entry
     accelerations: Entry
     project_poses: Entry
+
+    def advance(
+        self,
+        state: Array,
+        parameters: Array,
+        voltage: Array,
+        elbows: NDArray[np.int64],
+        steps: Array,
+        summary: Array,
+        first: int,
+        end: int,
+    ) -> int:
+        """Arms first..end-1 through steps of given lengths under constant voltages: a `control_step` without a task.
+
+        Arguments and result are those of `control_step`.
+        """
+        own = (state, parameters, elbows, steps, summary)
+        return self.control_step(voltage, voltage, control.NO_QUEUE, *own, *control.NO_TASK, first, end)
 
 
 def kernel(
@@ -57,8 +77,7 @@ def assemble(lanes: int, compile_with: Entry, **switches: bool) -> Kernel:
     letters = "".join(name[0] for name, on in switches.items() if on)
     made = instances(offsets(lanes, **switches), f"{lanes}{letters}_{sources()}", compile_with)
     return Kernel(
-        *(made[entry.__name__] for entry in (control.advance, control.control_step)),
-        *(made[entry.__name__] for entry in (entries.refresh, entries.accelerations, entries.project_poses)),
+        *(made[entry.__name__] for entry in (control.control_step, entries.accelerations, entries.project_poses))
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from elbow_gym.kernel.observe import path
 from elbow_gym.kernel.template import sources
 
-NAME = re.compile(r"[a-z_0-9]+\.\w+_([0-9a-f]{10})-\d+\.py\d+\.(?:nbi|\d+\.nbc)")
+NAME = re.compile(r"[a-z_0-9]+\.\w+_([0-9a-f]{10})-\d+\.py\d+\.(?:nbi|lock|\d+\.nbc)")
 """Name of an entry's file: module, name with the digest of the sources, line, Python and kind."""
 
 

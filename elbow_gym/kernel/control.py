@@ -8,6 +8,7 @@ from elbow_gym.kernel.acceleration import accelerate
 from elbow_gym.kernel.block import gather, scatter, workspace
 from elbow_gym.kernel.integration import move
 from elbow_gym.kernel.observe import observe
+from elbow_gym.kernel.rows import DELAY, HIGHEST, PERIODS, TASK_COLUMNS, VOLTS
 from elbow_gym.kernel.slots import ASTRAY, BELOW, LANES, W
 from elbow_gym.kernel.template import template
 
@@ -35,62 +36,58 @@ def run(state, parameters, voltage, elbows, steps, summary, first, end):
 
 
 @template(entry=True)
-def advance(state, parameters, voltage, elbows, steps, summary, first, end):
-    """Advances arms first..end-1 of a batch under constant voltage, in place.
-
-    An arm whose state leaves the representable keeps its old state and summary, with VALID at zero.
-
-    Args:
-        state: state rows, (B, STATE_ROWS, n).
-        parameters: parameter rows, (B, PARAMETER_ROWS, n).
-        voltage: terminal voltages [V], (B, n).
-        elbows: joint numbers of the elbows, (p,).
-        steps: lengths of the steps [s].
-        summary: filled, (B, SUMMARY_COLUMNS + p).
-        first: first arm.
-        end: arm after the last.
-
-    Returns:
-        The number of arms that are not VALID.
-    """
-    return run(state, parameters, voltage, elbows, steps, summary, first, end)
-
-
-@template(entry=True)
 def control_step(
-    action, voltage, highest, volts, queue, late, state, parameters, elbows, steps, summary, pose, coefficients, phase,
-    turn, periods, lookahead, starts, scale, high, price, spent, observation, figures, first, end,
+    action, voltage, queue, state, parameters, elbows, steps, summary, clock, task, path, pose, starts, scales, price,
+    observation, figures, first, end,
 ):  # fmt: skip
     """One control period of arms first..end-1: volts of actions, steps, observation and reward.
 
-    State to summary are those of `advance`, pose to figures those of `observe`.
+    Without steps, the summary is that of the present state. An arm whose state leaves the representable keeps its old
+    state and summary, with VALID at zero. From clock on, arguments are those of `observe`.
 
     Args:
         action: actions (B, n), in their unit.
         voltage: filled with the voltages that arrive at the motors [V], (B, n).
-        highest: largest action of each arm, (B,).
-        volts: volts per unit of action, (B,).
-        queue: voltages asked for, newest first [V], (B, 1 + longest delay, n).
-        late: delay of each arm's actions [control periods], (B,).
+        queue: voltages asked for, newest first [V], (B, 1 + longest delay, n); without rows, voltages are given as they
+            are, and actions are not read.
+        state: state rows, (B, STATE_ROWS, n).
+        parameters: parameter rows, (B, PARAMETER_ROWS, n).
+        elbows: joint numbers of the elbows, (p,).
+        steps: lengths of the steps [s].
+        summary: filled, (B, SUMMARY_COLUMNS + p).
+        clock: moved on by a control period, (B, 2), unless observations have no columns.
+        task: also the largest actions, the volts per unit of action and the delays.
+        observation: filled, unless it has no columns.
 
     Returns:
         The number of arms that are not VALID; -1, with nothing changed, where an action is not a number.
     """
-    for b in range(first, end):
-        for a in range(action.shape[1]):
-            if np.isnan(action[b, a]):
-                return -1
-    for b in range(first, end):
-        for d in range(queue.shape[1] - 1, 0, -1):
-            for a in range(action.shape[1]):
-                queue[b, d, a] = queue[b, d - 1, a]
-        for a in range(action.shape[1]):
-            queue[b, 0, a] = min(max(action[b, a], -highest[b]), highest[b]) * volts[b]
-        for a in range(action.shape[1]):
-            voltage[b, a] = queue[b, late[b], a]
+    n = action.shape[1]
+    if queue.shape[1] > 0:
+        for b in range(first, end):
+            for a in range(n):
+                if np.isnan(action[b, a]):
+                    return -1
+        for b in range(first, end):
+            highest = task[b, HIGHEST]
+            for a in range(n):
+                for d in range(queue.shape[1] - 1, 0, -1):
+                    queue[b, d, a] = queue[b, d - 1, a]
+                queue[b, 0, a] = min(max(action[b, a], -highest), highest) * task[b, VOLTS]
+                voltage[b, a] = queue[b, int(task[b, DELAY]), a]
     invalid = run(state, parameters, voltage, elbows, steps, summary, first, end)
-    observe(
-        state, summary, pose, coefficients, phase, turn, periods, lookahead, starts, scale, high, price, spent,
-        observation, figures, first, end,
-    )  # fmt: skip
+    if observation.shape[1] > 0:
+        for b in range(first, end):
+            clock[b, PERIODS] += 1
+        observe(
+            state, summary, clock, task, path, pose, starts, scales, price, observation, figures, first, end
+        )  # fmt: skip
     return invalid
+
+
+NO_QUEUE = np.zeros((0, 0, 0))
+# Clock to figures of a call that only moves the arms.
+NO_TASK = (
+    np.zeros((0, 2), np.int64), np.zeros((0, TASK_COLUMNS)), np.zeros((0, 0, 3)), np.zeros(0), np.zeros(0, np.int64),
+    np.zeros((2, 0)), np.zeros(4), np.zeros((0, 0), np.float32), np.zeros((0, 0)),
+)  # fmt: skip

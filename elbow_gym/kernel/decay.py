@@ -12,7 +12,7 @@ _THIRD, _SIXTH, _FIFTH, _SEVENTH, _NINTH = 1.0 / 3.0, 1.0 / 6.0, 1.0 / 5.0, 1.0 
 _TENTH, _ELEVENTH, _TWELFTH = 1.0 / 10.0, 1.0 / 11.0, 1.0 / 12.0
 
 
-@template(inlined=True)
+@template(flat=True)
 def exponential(x):
     """e^-x [-] of x >= 0, to 1e-15 absolute: a short series of x / 64, squared six times."""
     y = min(x, 32.0) * (1.0 / 64.0)
@@ -27,7 +27,7 @@ def exponential(x):
     return e
 
 
-@template(inlined=True)
+@template(flat=True)
 def phi_4(z):
     """phi_4 [-] by its series, for 0 <= z <= 1/2."""
     f = 1.0 - z * _NINTH * (1.0 - z * _TENTH * (1.0 - z * _ELEVENTH * (1.0 - z * _TWELFTH)))
@@ -42,13 +42,14 @@ def current_coefficients(ws, n, step):
     Writes: DECAY, HALF_DECAY, HALF_GAIN, END_0, END_MID, END_1, MEAN_DECAY, MEAN_0, MEAN_MID, MEAN_1, START_R.
     """
     for a in range(n):
-        here = U(a * STRIDE)
+        record = U(a * STRIDE)
         for k in range(LANES):
-            resistance = ws[here + RESISTANCE + k]
+            here = record + k
+            resistance = ws[here + RESISTANCE]
             if DRIVE:
-                resistance *= 1.0 + ws[here + WARMING + k] * ws[here + TEMPERATURE + k]
-                ws[here + START_R + k] = resistance
-            gain = step * ws[here + INVERSE_L + k]
+                resistance *= 1.0 + ws[here + WARMING] * ws[here + TEMPERATURE]
+                ws[here + START_R] = resistance
+            gain = step * ws[here + INVERSE_L]
             z = gain * resistance
             half = exponential(0.5 * z)
             decay = half * half
@@ -67,13 +68,13 @@ def current_coefficients(ws, n, step):
             f2 = s2 if short else f2
             f3 = s3 if short else f3
             f4 = s4 if short else f4
-            ws[here + HALF_DECAY + k] = half
-            ws[here + HALF_GAIN + k] = gain * f1 / (1.0 + half)
-            ws[here + DECAY + k] = decay
-            ws[here + END_0 + k] = gain * (f1 - 3.0 * f2 + 4.0 * f3)
-            ws[here + END_MID + k] = gain * (4.0 * f2 - 8.0 * f3)
-            ws[here + END_1 + k] = gain * (4.0 * f3 - f2)
-            ws[here + MEAN_DECAY + k] = f1
-            ws[here + MEAN_0 + k] = gain * (f2 - 3.0 * f3 + 4.0 * f4)
-            ws[here + MEAN_MID + k] = gain * (4.0 * f3 - 8.0 * f4)
-            ws[here + MEAN_1 + k] = gain * (4.0 * f4 - f3)
+            ws[here + HALF_DECAY] = half
+            ws[here + HALF_GAIN] = gain * f1 / (1.0 + half)
+            ws[here + DECAY] = decay
+            ws[here + END_0] = gain * (f1 - 3.0 * f2 + 4.0 * f3)
+            ws[here + END_MID] = gain * (4.0 * f2 - 8.0 * f3)
+            ws[here + END_1] = gain * (4.0 * f3 - f2)
+            ws[here + MEAN_DECAY] = f1
+            ws[here + MEAN_0] = gain * (f2 - 3.0 * f3 + 4.0 * f4)
+            ws[here + MEAN_MID] = gain * (4.0 * f3 - 8.0 * f4)
+            ws[here + MEAN_1] = gain * (4.0 * f4 - f3)

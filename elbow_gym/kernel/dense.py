@@ -9,7 +9,7 @@ from elbow_gym.kernel.slots import COUPLING, FORCES, FREE_RISE, MATRIX, PUSHING,
 from elbow_gym.kernel.template import template
 
 
-@template
+@template(flat=True)
 def cholesky_solve(shared, lanes, p):
     """Elbow forces -W^-1 f in place of f, by Cholesky W = L L^T in place; the diagonal then holds 1 / L_jj.
 

@@ -20,30 +20,32 @@ def friction_response(ws, shared, lanes, elbow, j):
     Reads: Q_DOT, ROTOR, RHO, RHO_DOT, ER, EZ, D, ELBOW_FRICTION, IR3, IZ3, CR, CZ, C3.
     Writes: CR, CZ, C3, X, SLIDE_R, SLIDE_T.
     """
-    here = U((elbow - 2) * STRIDE)
-    child = here + NEXT
+    record = U((elbow - 2) * STRIDE)
     for k in range(lanes):
-        radial = ws[here + RHO_DOT + k]
-        tangential = ws[here + RHO + k] * ws[Q_DOT + k]
+        here = record + k
+        child = here + NEXT
+        radial = ws[here + RHO_DOT]
+        tangential = ws[here + RHO] * ws[Q_DOT + k]
         speed = np.sqrt(radial * radial + tangential * tangential + ELBOW_SPEED * ELBOW_SPEED)
-        share = -ws[here + ELBOW_FRICTION + k] / speed
+        share = -ws[here + ELBOW_FRICTION] / speed
         shared[SLIDE_R + U(j * W) + k] = share * radial
         shared[SLIDE_T + U(j * W) + k] = share * tangential
-        ws[child + CR + k] = -share * radial
-        ws[child + CZ + k] = 0.0
-        ws[child + C3 + k] = 0.0
+        ws[child + CR] = -share * radial
+        ws[child + CZ] = 0.0
+        ws[child + C3] = 0.0
     for a in range(elbow - 2, 0, -1):
-        here = U(a * STRIDE)
-        child = here + NEXT
+        record = U(a * STRIDE)
         for k in range(LANES):
-            cr = ws[child + CR + k]
-            cz = ws[child + CZ + k]
-            x = -((ws[here + ER + k] * cr + ws[here + EZ + k] * cz) + ws[child + C3 + k])
-            dx = ws[here + D + k] * x
-            ws[here + CR + k] = cr + dx * ws[here + IR3 + k]
-            ws[here + CZ + k] = cz + dx * ws[here + IZ3 + k]
-            ws[here + C3 + k] = -ws[here + ROTOR + k] * dx
-            ws[here + U(X + j * W) + k] = x
+            here = record + k
+            child = here + NEXT
+            cr = ws[child + CR]
+            cz = ws[child + CZ]
+            x = -((ws[here + ER] * cr + ws[here + EZ] * cz) + ws[child + C3])
+            dx = ws[here + D] * x
+            ws[here + CR] = cr + dx * ws[here + IR3]
+            ws[here + CZ] = cz + dx * ws[here + IZ3]
+            ws[here + C3] = -ws[here + ROTOR] * dx
+            ws[here + U(X + j * W)] = x
 
 
 @template
@@ -66,10 +68,11 @@ def friction_coupling(ws, shared, lanes, elbows):
                 shared[MATRIX + entry + k] = shared[symmetric + k]
                 shared[COUPLING + entry + k] = 0.0
             for a in range(1, min(elbows[i], elbows[j]) - 1):
-                here = U(a * STRIDE)
+                record = U(a * STRIDE)
                 for k in range(lanes):
-                    answer = ws[here + U(Y + i * W) + k]
-                    shared[COUPLING + entry + k] += ws[here + D + k] * answer * ws[here + U(X + j * W) + k]
+                    here = record + k
+                    answer = ws[here + U(Y + i * W)]
+                    shared[COUPLING + entry + k] += ws[here + D] * answer * ws[here + U(X + j * W)]
 
 
 @template
@@ -96,16 +99,18 @@ def apply_friction(ws, shared, lanes, tip, elbows):
         x_slot = U(X + j * W)
         push = PUSH + U(j * W)
         for a in range(1, elbows[j] - 1):
-            here = U(a * STRIDE)
+            record = U(a * STRIDE)
             for k in range(lanes):
-                ws[here + R + k] += ws[here + x_slot + k] * shared[push + k]
-        here = U((elbows[j] - 2) * STRIDE)
+                here = record + k
+                ws[here + R] += ws[here + x_slot] * shared[push + k]
+        record = U((elbows[j] - 2) * STRIDE)
         for k in range(lanes):
+            here = record + k
             radial = shared[SLIDE_R + U(j * W) + k] * shared[push + k]
             tangential = shared[SLIDE_T + U(j * W) + k] * shared[push + k]
-            lost = -(radial * ws[here + RHO_DOT + k] + tangential * ws[here + RHO + k] * ws[Q_DOT + k])
-            ws[here + LOSS + k] = ws[here + LOSS + k] + lost if TABLE else lost
-            ws[tip + TWIST + k] += tangential * ws[here + RHO + k]
+            lost = -(radial * ws[here + RHO_DOT] + tangential * ws[here + RHO] * ws[Q_DOT + k])
+            ws[here + LOSS] = ws[here + LOSS] + lost if TABLE else lost
+            ws[tip + TWIST + k] += tangential * ws[here + RHO]
 
 
 @template
@@ -118,7 +123,8 @@ def friction_fixed_point(ws, shared, n, elbows):
     Reads: FORCES, PUSHING, PUSH_LIMIT.
     Writes: TWIST, PUSHING, PUSH_LIMIT.
     """
-    lanes = min(LANES, U(ws.size))
+    # As in `elbow_forces`.
+    lanes = LANES if W == 1 else min(LANES, U(ws.size))
     p = elbows.size
     tip = U((n - 1) * STRIDE)
     if not TABLE:

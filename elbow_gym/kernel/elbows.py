@@ -20,34 +20,37 @@ def elbow_forces(ws, shared, n, elbows):
     Reads: ROTOR, SUMZ, ER, EZ, D, FREE, GAIN, IR3, IZ3, R, CR, CZ, C3, Y, FORCES.
     Writes: FREE, GAIN, R, CR, CZ, C3, Y, FORCES.
     """
-    # An opaque trip count: LLVM would unroll short bodies of a known one into scalar code.
-    lanes = min(LANES, U(ws.size))
+    # An opaque trip count: LLVM would unroll short bodies of a known one into scalar code. One lane is scalar anyway,
+    # and what it would prepare for more is much to compile.
+    lanes = LANES if W == 1 else min(LANES, U(ws.size))
     for j in range(elbows.size):
         last = elbows[j] - 2
         y_slot = U(Y + j * W)
         row = U(j * MAXIMUM_ELBOWS * W)
-        here = U(last * STRIDE)
-        child = here + NEXT
+        record = U(last * STRIDE)
         for k in range(lanes):
-            ws[child + CR + k] = 0.0
-            ws[child + CZ + k] = -1.0
-            ws[child + C3 + k] = 0.0
-            ws[child + FREE + k] = ws[here + SUMZ + k]
-            ws[child + GAIN + k] = 0.0
-        for a in range(last, 0, -1):
-            here = U(a * STRIDE)
+            here = record + k
             child = here + NEXT
+            ws[child + CR] = 0.0
+            ws[child + CZ] = -1.0
+            ws[child + C3] = 0.0
+            ws[child + FREE] = ws[here + SUMZ]
+            ws[child + GAIN] = 0.0
+        for a in range(last, 0, -1):
+            record = U(a * STRIDE)
             for k in range(LANES):
-                cr = ws[child + CR + k]
-                cz = ws[child + CZ + k]
-                y = -((ws[here + ER + k] * cr + ws[here + EZ + k] * cz) + ws[child + C3 + k])
-                dy = ws[here + D + k] * y
-                ws[here + CR + k] = cr + dy * ws[here + IR3 + k]
-                ws[here + CZ + k] = cz + dy * ws[here + IZ3 + k]
-                ws[here + C3 + k] = -ws[here + ROTOR + k] * dy
-                ws[here + FREE + k] = ws[child + FREE + k] + dy * ws[here + R + k]
-                ws[here + GAIN + k] = ws[child + GAIN + k] + dy * y
-                ws[here + y_slot + k] = y
+                here = record + k
+                child = here + NEXT
+                cr = ws[child + CR]
+                cz = ws[child + CZ]
+                y = -((ws[here + ER] * cr + ws[here + EZ] * cz) + ws[child + C3])
+                dy = ws[here + D] * y
+                ws[here + CR] = cr + dy * ws[here + IR3]
+                ws[here + CZ] = cz + dy * ws[here + IZ3]
+                ws[here + C3] = -ws[here + ROTOR] * dy
+                ws[here + FREE] = ws[child + FREE] + dy * ws[here + R]
+                ws[here + GAIN] = ws[child + GAIN] + dy * y
+                ws[here + y_slot] = y
         for k in range(lanes):
             shared[row + U(j * W) + k] = ws[NEXT + GAIN + k]
             shared[FORCES + U(j * W) + k] = ws[NEXT + FREE + k]
@@ -57,9 +60,10 @@ def elbow_forces(ws, shared, n, elbows):
             for k in range(lanes):
                 shared[entry + k] = 0.0
             for a in range(1, elbows[i] - 1):
-                here = U(a * STRIDE)
+                record = U(a * STRIDE)
                 for k in range(lanes):
-                    shared[entry + k] += ws[here + D + k] * ws[here + y_slot + k] * ws[here + other + k]
+                    here = record + k
+                    shared[entry + k] += ws[here + D] * ws[here + y_slot] * ws[here + other]
     if RUBBING:
         friction_fixed_point(ws, shared, n, elbows)
     cholesky_solve(shared, lanes, elbows.size)
@@ -69,6 +73,7 @@ def elbow_forces(ws, shared, n, elbows):
         y_slot = U(Y + j * W)
         force = FORCES + U(j * W)
         for a in range(1, elbows[j] - 1):
-            here = U(a * STRIDE)
+            record = U(a * STRIDE)
             for k in range(lanes):
-                ws[here + R + k] += ws[here + y_slot + k] * shared[force + k]
+                here = record + k
+                ws[here + R] += ws[here + y_slot] * shared[force + k]

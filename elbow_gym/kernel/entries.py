@@ -1,38 +1,16 @@
-"""Entries beside runs: the summary of a state, accelerations, and poses on the elbows' plane."""
+"""Entries beside runs: accelerations, and poses on the elbows' plane."""
 
 # pyright: basic
 
-import numpy as np
-
 from elbow_gym.kernel.acceleration import accelerate
-from elbow_gym.kernel.block import gather, scatter, workspace
+from elbow_gym.kernel.block import gather, workspace
 from elbow_gym.kernel.integration import evaluate
 from elbow_gym.kernel.projection import project
 from elbow_gym.kernel.slots import (
-    ASTRAY, BELOW, CURRENT, DRIVE, FORCES, INVERSE_L, LANES, LENGTH, NET, Q, Q_DDOT, RESISTANCE, STRIDE, TEMPERATURE,
-    U, W, WARMING,
+    CURRENT, DRIVE, FORCES, INVERSE_L, LENGTH, NET, Q, Q_DDOT, RESISTANCE, STRIDE, TEMPERATURE, U, W,
+    WARMING,
 )  # fmt: skip
 from elbow_gym.kernel.template import template
-
-
-@template(entry=True)
-def refresh(state, parameters, elbows, summary, first, end):
-    """Summary of arms first..end-1 at their present state, with no step taken.
-
-    Writes: ASTRAY, BELOW.
-    """
-    n = state.shape[2]
-    ws, shared = workspace(n)
-    voltage = np.zeros((state.shape[0], n))
-    for start in range(first, end, W):
-        gather(ws, n, start, state[:end], parameters, voltage)
-        for k in range(LANES):
-            shared[BELOW + k] = 0.0
-            shared[ASTRAY + k] = 0.0
-        evaluate(ws, shared, n, elbows)
-        accelerate(ws, n, 0.0)
-        for lane in range(min(W, end - start)):
-            scatter(ws, shared, n, lane, elbows, state[start + lane], summary[start + lane])
 
 
 @template(entry=True)

@@ -35,25 +35,28 @@ from elbow_gym.kernel.winding import warm
 def exponential_first(ws, n, step):
     """Stage 1, which keeps the state that the step starts from.
 
-    Reads: Q, Q_DOT, CURRENT, Q_DDOT, HALF_DECAY, HALF_GAIN.
+    Reads: Q, Q_DOT, CURRENT, Q_DDOT, NET, HALF_DECAY, HALF_GAIN.
     Writes: Q, Q_DOT, CURRENT, Q0, Q_DOT0, CURRENT0, Q_DOT_SUM, NET_0.
     """
     half = step / 2.0
     for a in range(n):
-        here = U(a * STRIDE)
+        record = U(a * STRIDE)
         for k in range(LANES):
-            net = net_voltage(ws, here, k, step / 6.0, half, 1)
-            q_dot = ws[here + Q_DOT + k]
-            i = ws[here + CURRENT + k]
-            q_ddot = ws[here + Q_DDOT + k]
-            ws[here + Q0 + k] = ws[here + Q + k]
-            ws[here + Q_DOT0 + k] = q_dot
-            ws[here + CURRENT0 + k] = i
-            ws[here + NET_0 + k] = net
-            ws[here + Q_DOT_SUM + k] = step / 6.0 * q_ddot
-            ws[here + Q + k] += half * q_dot
-            ws[here + Q_DOT + k] = q_dot + half * q_ddot
-            ws[here + CURRENT + k] = ws[here + HALF_DECAY + k] * i + ws[here + HALF_GAIN + k] * net
+            here = record + k
+            net = ws[here + NET]
+            if DRIVE:
+                net -= heated(ws, here, step / 6.0, half, 1)
+            q_dot = ws[here + Q_DOT]
+            i = ws[here + CURRENT]
+            q_ddot = ws[here + Q_DDOT]
+            ws[here + Q0] = ws[here + Q]
+            ws[here + Q_DOT0] = q_dot
+            ws[here + CURRENT0] = i
+            ws[here + NET_0] = net
+            ws[here + Q_DOT_SUM] = step / 6.0 * q_ddot
+            ws[here + Q] += half * q_dot
+            ws[here + Q_DOT] = q_dot + half * q_ddot
+            ws[here + CURRENT] = ws[here + HALF_DECAY] * i + ws[here + HALF_GAIN] * net
     turn_plane(ws)
 
 
@@ -61,23 +64,24 @@ def exponential_first(ws, n, step):
 def exponential_second(ws, n, step):
     """Stage 2, at half a step.
 
-    Reads: Q_DOT, CURRENT, Q0, Q_DOT0, CURRENT0, Q_DOT_SUM, Q_DDOT, HALF_DECAY, HALF_GAIN.
+    Reads: Q_DOT, CURRENT, Q0, Q_DOT0, CURRENT0, Q_DOT_SUM, Q_DDOT, NET, HALF_DECAY, HALF_GAIN.
     Writes: Q, Q_DOT, CURRENT, Q_DOT_SUM, CURRENT_SUM, NET_MID.
     """
     half = step / 2.0
     for a in range(n):
-        here = U(a * STRIDE)
+        record = U(a * STRIDE)
         for k in range(LANES):
-            net = net_voltage(ws, here, k, step / 3.0, half, 2)
-            q_ddot = ws[here + Q_DDOT + k]
-            ws[here + NET_MID + k] = net
-            ws[here + CURRENT_SUM + k] = ws[here + CURRENT + k]
-            ws[here + Q_DOT_SUM + k] += step / 3.0 * q_ddot
-            ws[here + Q + k] = ws[here + Q0 + k] + half * ws[here + Q_DOT + k]
-            ws[here + Q_DOT + k] = ws[here + Q_DOT0 + k] + half * q_ddot
-            ws[here + CURRENT + k] = (
-                ws[here + HALF_DECAY + k] * ws[here + CURRENT0 + k] + ws[here + HALF_GAIN + k] * net
-            )
+            here = record + k
+            net = ws[here + NET]
+            if DRIVE:
+                net -= heated(ws, here, step / 3.0, half, 2)
+            q_ddot = ws[here + Q_DDOT]
+            ws[here + NET_MID] = net
+            ws[here + CURRENT_SUM] = ws[here + CURRENT]
+            ws[here + Q_DOT_SUM] += step / 3.0 * q_ddot
+            ws[here + Q] = ws[here + Q0] + half * ws[here + Q_DOT]
+            ws[here + Q_DOT] = ws[here + Q_DOT0] + half * q_ddot
+            ws[here + CURRENT] = ws[here + HALF_DECAY] * ws[here + CURRENT0] + ws[here + HALF_GAIN] * net
     turn_plane(ws)
 
 
@@ -85,28 +89,31 @@ def exponential_second(ws, n, step):
 def exponential_third(ws, n, step):
     """Stage 3, at half a step; the next one is at its end, with the current that makes Simpson's mean the true one.
 
-    Reads: Q_DOT, CURRENT, Q0, Q_DOT0, CURRENT0, Q_DOT_SUM, CURRENT_SUM, KM, Q_DDOT, MEAN_DECAY, MEAN_0, MEAN_MID,
-        MEAN_1, NET_0, NET_MID.
+    Reads: Q_DOT, CURRENT, Q0, Q_DOT0, CURRENT0, Q_DOT_SUM, CURRENT_SUM, KM, Q_DDOT, NET, MEAN_DECAY, MEAN_0,
+        MEAN_MID, MEAN_1, NET_0, NET_MID.
     Writes: Q, Q_DOT, CURRENT, Q_DOT_SUM, NET_MID.
     """
     for a in range(n):
-        here = U(a * STRIDE)
+        record = U(a * STRIDE)
         for k in range(LANES):
-            net = net_voltage(ws, here, k, step / 3.0, step, 3)
-            q_dot = ws[here + Q_DOT + k]
-            q_ddot = ws[here + Q_DDOT + k]
-            i0 = ws[here + CURRENT0 + k]
-            middle = 0.5 * (ws[here + NET_MID + k] + net)
-            late = ws[here + Q_DOT0 + k] + step * q_ddot
-            mean = ws[here + MEAN_DECAY + k] * i0 + (
-                (ws[here + MEAN_0 + k] * ws[here + NET_0 + k] + ws[here + MEAN_MID + k] * middle)
-                + ws[here + MEAN_1 + k] * (net + ws[here + KM + k] * (q_dot - late))
+            here = record + k
+            net = ws[here + NET]
+            if DRIVE:
+                net -= heated(ws, here, step / 3.0, step, 3)
+            q_dot = ws[here + Q_DOT]
+            q_ddot = ws[here + Q_DDOT]
+            i0 = ws[here + CURRENT0]
+            middle = 0.5 * (ws[here + NET_MID] + net)
+            late = ws[here + Q_DOT0] + step * q_ddot
+            mean = ws[here + MEAN_DECAY] * i0 + (
+                (ws[here + MEAN_0] * ws[here + NET_0] + ws[here + MEAN_MID] * middle)
+                + ws[here + MEAN_1] * (net + ws[here + KM] * (q_dot - late))
             )
-            ws[here + NET_MID + k] = middle
-            ws[here + Q_DOT_SUM + k] += step / 3.0 * q_ddot
-            ws[here + Q + k] = ws[here + Q0 + k] + step * q_dot
-            ws[here + Q_DOT + k] = late
-            ws[here + CURRENT + k] = 6.0 * mean - i0 - 2.0 * (ws[here + CURRENT_SUM + k] + ws[here + CURRENT + k])
+            ws[here + NET_MID] = middle
+            ws[here + Q_DOT_SUM] += step / 3.0 * q_ddot
+            ws[here + Q] = ws[here + Q0] + step * q_dot
+            ws[here + Q_DOT] = late
+            ws[here + CURRENT] = 6.0 * mean - i0 - 2.0 * (ws[here + CURRENT_SUM] + ws[here + CURRENT])
     turn_plane(ws)
 
 
@@ -114,41 +121,40 @@ def exponential_third(ws, n, step):
 def exponential_fourth(ws, n, step):
     """Stage 4, whose next state is the step's end.
 
-    Reads: Q, Q_DOT, Q0, Q_DOT0, CURRENT0, Q_DOT_SUM, Q_DDOT, DECAY, END_0, END_MID, END_1, NET_0, NET_MID.
+    Reads: Q, Q_DOT, Q0, Q_DOT0, CURRENT0, Q_DOT_SUM, Q_DDOT, NET, DECAY, END_0, END_MID, END_1, NET_0,
+        NET_MID.
     Writes: Q, Q_DOT, CURRENT.
     """
     for a in range(n):
-        here = U(a * STRIDE)
+        record = U(a * STRIDE)
         for k in range(LANES):
-            net = net_voltage(ws, here, k, step / 6.0, step, 4)
-            q_dot = ws[here + Q_DOT + k]
-            q0 = ws[here + Q0 + k]
-            q_dot0 = ws[here + Q_DOT0 + k]
-            gained = ws[here + Q_DOT_SUM + k]
-            end = q_dot0 + (gained + step / 6.0 * ws[here + Q_DDOT + k])
+            here = record + k
+            net = ws[here + NET]
+            if DRIVE:
+                net -= heated(ws, here, step / 6.0, step, 4)
+            q_dot = ws[here + Q_DOT]
+            q0 = ws[here + Q0]
+            q_dot0 = ws[here + Q_DOT0]
+            gained = ws[here + Q_DOT_SUM]
+            end = q_dot0 + (gained + step / 6.0 * ws[here + Q_DDOT])
             # The angle's own increment, out of what the stages left behind: one row less to keep.
             shift = step * q_dot0
-            turned = (shift + step * gained) - (ws[here + Q + k] - q0 - shift) * (1.0 / 3.0)
-            ws[here + Q + k] = q0 + (turned - step / 6.0 * (q_dot - q_dot0))
-            ws[here + Q_DOT + k] = end
-            ws[here + CURRENT + k] = ws[here + DECAY + k] * ws[here + CURRENT0 + k] + (
-                (ws[here + END_0 + k] * ws[here + NET_0 + k] + ws[here + END_MID + k] * ws[here + NET_MID + k])
-                + ws[here + END_1 + k] * net
+            turned = (shift + step * gained) - (ws[here + Q] - q0 - shift) * (1.0 / 3.0)
+            ws[here + Q] = q0 + (turned - step / 6.0 * (q_dot - q_dot0))
+            ws[here + Q_DOT] = end
+            ws[here + CURRENT] = ws[here + DECAY] * ws[here + CURRENT0] + (
+                (ws[here + END_0] * ws[here + NET_0] + ws[here + END_MID] * ws[here + NET_MID]) + ws[here + END_1] * net
             )
-            close_meters(ws, here, k)
+            close_meters(ws, here)
     turn_plane(ws)
 
 
 @template(inlined=True)
-def net_voltage(ws, here, k, weight, ahead, number):
-    """The net voltage [V] of stage `number`, 1 to 4.
+def heated(ws, here, weight, ahead, number):
+    """Voltage that a winding has come to take in stage `number`, 1 to 4, by its warming since the step's start [V].
 
-    The coefficients know the resistance at the step's start; what a warm winding has gained since counts as a voltage.
+    The step's coefficients know the resistance at its start, so that the rest counts as a voltage.
 
-    Reads: CURRENT, NET, START_R.
+    Reads: CURRENT, START_R.
     """
-    net = ws[here + NET + k]
-    if DRIVE:
-        i = ws[here + CURRENT + k]
-        net -= (warm(ws, here, k, weight, ahead, number) - ws[here + START_R + k]) * i
-    return net
+    return (warm(ws, here, weight, ahead, number) - ws[here + START_R]) * ws[here + CURRENT]

@@ -49,16 +49,15 @@ def move(ws, shared, n, elbows, steps):
         for k in range(LANES):
             shared[BELOW + k] += step if ws[tip + LOWEST_Z + k] < -LOWEST_FREE else 0.0
         for number in range(1, 5):
-            if number > 1:
-                evaluate(ws, shared, n, elbows)
-            accelerate(ws, n, step / 6.0 if number in (1, 4) else step / 3.0)
+            accelerate(ws, n, step / 3.0 if 1 < number < 4 else step / 6.0)
             take_stage(ws, n, step, number)
-        project(ws, shared, elbows)
-        for k in range(LANES):
-            left = shared[DRIFT + k] / step
-            shared[ASTRAY + k] = max(shared[ASTRAY + k], left if left > FREE_DRIFT else 0.0)
-        # The summary of the end of this step, and k_1 of the next.
-        evaluate(ws, shared, n, elbows)
+            if number == 4:
+                project(ws, shared, elbows)
+                for k in range(LANES):
+                    left = shared[DRIFT + k] / step
+                    shared[ASTRAY + k] = max(shared[ASTRAY + k], left if left > FREE_DRIFT else 0.0)
+            # After stage 4 this is the summary of the end of the step, and k_1 of the next.
+            evaluate(ws, shared, n, elbows)
 
 
 @template(flat=True)

@@ -12,11 +12,11 @@ from numba import types
 from numba.extending import intrinsic
 
 from elbow_gym.kernel import reward as plain
-from elbow_gym.kernel.rows import BELOW_TABLE, HAND, METERED
+from elbow_gym.kernel.rows import AHEAD, BELOW_TABLE, HAND, METERED, PAID, PERIODS, PHASE, TURN
 from elbow_gym.kernel.sine import sincos
-from elbow_gym.kernel.template import compiled, compiled_entry, renamed
+from elbow_gym.kernel.template import common_copy, compiled, compiled_entry, renamed
 
-_sincos = compiled(sincos)
+_sincos = common_copy(sincos, compiled)
 
 
 def _multiply_and_add(context, a, b, c):
@@ -39,14 +39,13 @@ _reward = compiled(
 
 
 @compiled
-def _path_point(coefficients, c, s, out):
+def _coordinate(coefficients, axis, c, s):
+    value = coefficients[0, axis]
     ch, sh = c, s
-    for axis in range(3):
-        out[axis] = coefficients[0, axis]
     for h in range(1, coefficients.shape[0], 2):
-        for axis in range(3):
-            out[axis] += coefficients[h, axis] * ch + coefficients[h + 1, axis] * sh
+        value += coefficients[h, axis] * ch + coefficients[h + 1, axis] * sh
         ch, sh = ch * c - sh * s, sh * c + ch * s
+    return value
 
 
 @compiled_entry
@@ -54,81 +53,67 @@ def path(coefficients, angle, out):
     """Points out (m, 3) of a closed path at angles (m,): a Fourier series, rows 1, cos, sin, cos 2, sin 2..."""
     for i in range(angle.size):
         s, c = _sincos(angle[i])
-        _path_point(coefficients, c, s, out[i])
+        for axis in range(3):
+            out[i, axis] = _coordinate(coefficients, axis, c, s)
 
 
 @compiled
-def _scaled(value, scale, high):
-    return min(max(np.float32(value / scale), -high), high)
+def _put(observation, b, m, scales, value):
+    high = np.float32(scales[1, m])
+    observation[b, m] = min(max(np.float32(value / scales[0, m]), -high), high)
 
 
 @compiled_entry
 def observe(
-    state, summary, pose, coefficients, phase, turn, periods, lookahead, starts, scale, high, price, spent,
-    observation, figures, first, end,
+    state, summary, clock, task, path, pose, starts, scales, price, observation, figures, first, end,
 ):  # fmt: skip
     """Fills observation (B, size) float32 and the rows FIGURES of figures, (9, B), for arms first..end-1.
 
     Args:
         state: the arms' state rows, (B, rows, n).
         summary: the arms' summary, (B, columns).
+        clock: steps and control periods since the reset, (B, 2).
+        task: what each arm is to do, (B, TASK_COLUMNS); the energy paid is brought up to date.
+        path: each arm's path as Fourier rows [m], (B, rows, 3).
         pose: what joint angles are counted from [rad], (n,).
-        coefficients: each arm's path as Fourier rows [m], (B, rows, 3).
-        phase: where the target was on it at the reset [rad], (B,).
-        turn: how far it turns in a control period [rad], (B,).
-        periods: control periods since the reset, (B,).
-        lookahead: angle from there to the look-ahead target [rad], (B,).
         starts: first entry of each of FEATURES in an observation, (7,).
-        scale: quantity per unit of each entry, (size,).
-        high: upper bounds of the entries, (size,).
-        price: tracking weight [1/m], energy weight [1/W], control frequency [Hz], whether negative power counts.
-        spent: energy paid so far [J], (B,), brought up to date.
+        scales: quantity per unit of each entry, and the entries' upper bounds, (2, size).
+        price: tracking weight [1/m], energy weight [1/W], control frequency [Hz], 1 if negative power counts, (4,).
         observation: filled.
         figures: filled.
         first: first arm.
         end: arm after the last.
     """
     n = state.shape[2]
-    later = np.empty(3)
-    target = np.empty(3)
-    tracking_weight, energy_weight, frequency, regeneration = price
     for b in range(first, end):
-        angle = phase[b] + turn[b] * periods[b]
+        angle = task[b, PHASE] + task[b, TURN] * clock[b, PERIODS]
         s, c = _sincos(angle)
-        _path_point(coefficients[b], c, s, target)
-        s_later, c_later = _sincos(angle + lookahead[b])
-        _path_point(coefficients[b], c_later, s_later, later)
-        for a in range(n):
-            m = starts[0] + a
-            observation[b, m] = _scaled(state[b, 0, a] - pose[a], scale[m], high[m])
-            m = starts[1] + a
-            observation[b, m] = _scaled(state[b, 1, a], scale[m], high[m])
-            m = starts[2] + a
-            observation[b, m] = _scaled(state[b, 2, a], scale[m], high[m])
+        s_later, c_later = _sincos(angle + task[b, AHEAD])
+        for row in range(3):
+            for a in range(n):
+                value = state[b, row, a]
+                if row == 0:
+                    value -= pose[a]
+                _put(observation, b, starts[row] + a, scales, value)
         squared = 0.0
         for axis in range(3):
             hand = summary[b, HAND + axis]
-            error = hand - target[axis]
+            error = hand - _coordinate(path[b], axis, c, s)
             squared += error * error
-            m = starts[3] + axis
-            observation[b, m] = _scaled(error, scale[m], high[m])
-            m = starts[4] + axis
-            observation[b, m] = _scaled(hand - coefficients[b, 0, axis], scale[m], high[m])
-            m = starts[5] + axis
-            observation[b, m] = _scaled(hand - later[axis], scale[m], high[m])
-        m = starts[6]
-        observation[b, m] = _scaled(c, scale[m], high[m])
-        observation[b, m + 1] = _scaled(s, scale[m + 1], high[m + 1])
+            _put(observation, b, starts[3] + axis, scales, error)
+            _put(observation, b, starts[4] + axis, scales, hand - path[b, 0, axis])
+            _put(observation, b, starts[5] + axis, scales, hand - _coordinate(path[b], axis, c_later, s_later))
+        _put(observation, b, starts[6], scales, c)
+        _put(observation, b, starts[6] + 1, scales, s)
         for row, meter in METERED:
             total = 0.0
             for a in range(n):
                 total += state[b, meter, a]
             figures[row, b] = total
-        paid = figures[2, b] if regeneration else figures[3, b]
-        figures[0, b] = np.sqrt(squared)
-        figures[1, b] = (paid - spent[b]) * frequency
-        figures[5, b], figures[6, b], figures[8, b] = _reward(
-            figures[0, b], figures[1, b], tracking_weight, energy_weight
-        )
+        paid = figures[2, b] if price[3] > 0.0 else figures[3, b]
+        error = np.sqrt(squared)
+        power = (paid - task[b, PAID]) * price[2]
+        figures[0, b], figures[1, b] = error, power
+        figures[5, b], figures[6, b], figures[8, b] = _reward(error, power, price[0], price[1])
         figures[7, b] = summary[b, BELOW_TABLE]
-        spent[b] = paid
+        task[b, PAID] = paid

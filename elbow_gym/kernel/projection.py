@@ -5,12 +5,12 @@
 from elbow_gym.kernel.rows import NEWTON_STEPS, SMALL_SHIFT
 from elbow_gym.kernel.sine import sincos
 from elbow_gym.kernel.slots import (
-    ACTIVE, DRIFT, ER, GRAM, HEIGHT, LANES, LENGTH, NEXT, OMEGA, PHI, Q, Q_DOT, RATE, SHIFT, STRIDE, U,
+    ACTIVE, DRIFT, ER, GRAM, HEIGHT, LANES, LENGTH, NEXT, OMEGA, PHI, Q, Q_DOT, RATE, SHIFT, STRIDE, U, W,
 )  # fmt: skip
 from elbow_gym.kernel.template import template
 
 
-@template
+@template(flat=True)
 def projection_step(ws, shared, elbows):
     """One step of `project` in the active lanes; those stay active that it has moved far.
 
@@ -19,61 +19,65 @@ def projection_step(ws, shared, elbows):
     Reads: Q, Q_DOT, LENGTH, PHI, OMEGA, ER, HEIGHT, RATE, GRAM, SHIFT, ACTIVE, DRIFT.
     Writes: Q, Q_DOT, PHI, OMEGA, ER, HEIGHT, RATE, GRAM, SHIFT, ACTIVE, DRIFT.
     """
-    lanes = min(LANES, U(ws.size))
+    lanes = LANES if W == 1 else min(LANES, U(ws.size))
     first = 1
     for k in range(lanes):
         shared[SHIFT + k] = 0.0
     for j in range(elbows.size):
         last = elbows[j] - 2
-        here = U((first - 1) * STRIDE)
+        record = U((first - 1) * STRIDE)
         for k in range(lanes):
-            ws[here + HEIGHT + k] = 0.0
-            ws[here + RATE + k] = 0.0
+            here = record + k
+            ws[here + HEIGHT] = 0.0
+            ws[here + RATE] = 0.0
             # A floor far below any real lever arm keeps a segment that stands upright finite.
-            ws[here + GRAM + k] = 1e-12
+            ws[here + GRAM] = 1e-12
         for a in range(first, last + 1):
-            here = U(a * STRIDE)
-            parent = here - NEXT
+            record = U(a * STRIDE)
             for k in range(LANES):
-                phi = ws[parent + PHI + k] + ws[here + Q + k]
-                omega = ws[parent + OMEGA + k] + ws[here + Q_DOT + k]
+                here = record + k
+                parent = here - NEXT
+                phi = ws[parent + PHI] + ws[here + Q]
+                omega = ws[parent + OMEGA] + ws[here + Q_DOT]
                 s, c = sincos(phi)
-                length = ws[here + LENGTH + k]
+                length = ws[here + LENGTH]
                 ls = length * s
-                ws[here + PHI + k] = phi
-                ws[here + OMEGA + k] = omega
-                ws[here + HEIGHT + k] = ws[parent + HEIGHT + k] + length * c
-                ws[here + RATE + k] = ws[parent + RATE + k] - ls * omega
-                ws[here + GRAM + k] = ws[parent + GRAM + k] + ls * ls
-                ws[here + ER + k] = ls
-        here = U(last * STRIDE)
+                ws[here + PHI] = phi
+                ws[here + OMEGA] = omega
+                ws[here + HEIGHT] = ws[parent + HEIGHT] + length * c
+                ws[here + RATE] = ws[parent + RATE] - ls * omega
+                ws[here + GRAM] = ws[parent + GRAM] + ls * ls
+                ws[here + ER] = ls
+        record = U(last * STRIDE)
         for k in range(lanes):
-            shared[DRIFT + k] = max(shared[DRIFT + k], shared[ACTIVE + k] * abs(ws[here + RATE + k]))
-            scale = shared[ACTIVE + k] / ws[here + GRAM + k]
-            height = ws[here + HEIGHT + k] * scale
-            rate = ws[here + RATE + k] * scale
-            ws[here + HEIGHT + k] = height
-            ws[here + RATE + k] = rate
+            here = record + k
+            shared[DRIFT + k] = max(shared[DRIFT + k], shared[ACTIVE + k] * abs(ws[here + RATE]))
+            scale = shared[ACTIVE + k] / ws[here + GRAM]
+            height = ws[here + HEIGHT] * scale
+            rate = ws[here + RATE] * scale
+            ws[here + HEIGHT] = height
+            ws[here + RATE] = rate
             # The next segment counts its pitch from here, and its first joint is about to take the shift back.
-            ws[here + PHI + k] += ws[here + ER + k] * height
-            ws[here + OMEGA + k] += ws[here + ER + k] * rate
+            ws[here + PHI] += ws[here + ER] * height
+            ws[here + OMEGA] += ws[here + ER] * rate
             shared[SHIFT + k] = max(shared[SHIFT + k], abs(height))
         # Tip to base: a link's own absolute shift, which the link after it takes back from its relative angle.
         for a in range(last, first - 1, -1):
-            here = U(a * STRIDE)
-            parent = here - NEXT
-            child = here + NEXT
+            record = U(a * STRIDE)
             for k in range(LANES):
-                height = ws[here + HEIGHT + k]
-                rate = ws[here + RATE + k]
-                shift = ws[here + ER + k] * height
-                kick = ws[here + ER + k] * rate
-                ws[parent + HEIGHT + k] = height
-                ws[parent + RATE + k] = rate
-                ws[here + Q + k] += shift
-                ws[here + Q_DOT + k] += kick
-                ws[child + Q + k] -= shift
-                ws[child + Q_DOT + k] -= kick
+                here = record + k
+                parent = here - NEXT
+                child = here + NEXT
+                height = ws[here + HEIGHT]
+                rate = ws[here + RATE]
+                shift = ws[here + ER] * height
+                kick = ws[here + ER] * rate
+                ws[parent + HEIGHT] = height
+                ws[parent + RATE] = rate
+                ws[here + Q] += shift
+                ws[here + Q_DOT] += kick
+                ws[child + Q] -= shift
+                ws[child + Q_DOT] -= kick
         first = last + 1
     for k in range(lanes):
         shared[ACTIVE + k] = 1.0 if shared[SHIFT + k] > SMALL_SHIFT else 0.0
@@ -89,7 +93,7 @@ def project(ws, shared, elbows):
     Reads: ACTIVE.
     Writes: ACTIVE, DRIFT.
     """
-    lanes = min(LANES, U(ws.size))
+    lanes = LANES if W == 1 else min(LANES, U(ws.size))
     for k in range(lanes):
         shared[ACTIVE + k] = 1.0
         shared[DRIFT + k] = 0.0

@@ -25,49 +25,50 @@ def outward(ws, n):
         for k in range(LANES):
             ws[BUS + k] = ws[VOLTAGE + k] * ws[CURRENT + k]
     for a in range(1, n):
-        here = U(a * STRIDE)
-        parent = here - NEXT
+        record = U(a * STRIDE)
         for k in range(LANES):
-            phi = ws[parent + PHI + k] + ws[here + Q + k]
-            w = ws[parent + OMEGA + k] + ws[here + Q_DOT + k]
+            here = record + k
+            parent = here - NEXT
+            phi = ws[parent + PHI] + ws[here + Q]
+            w = ws[parent + OMEGA] + ws[here + Q_DOT]
             s, c = sincos(phi)
-            m = ws[here + MASS + k]
-            half = 0.5 * ws[here + LENGTH + k]
-            difference = ws[here + DIFFERENCE + k]
-            spin = ws[parent + SPIN + k]
+            m = ws[here + MASS]
+            half = 0.5 * ws[here + LENGTH]
+            difference = ws[here + DIFFERENCE]
+            spin = ws[parent + SPIN]
             hs = half * s
             hc = half * c
             ww = w * w
-            rho = ws[parent + RHO + k] + hs
-            rhod = ws[parent + RHO_DOT + k] + hc * w
-            sumr = ws[parent + SUMR + k] - hs * ww
-            sumz = ws[parent + SUMZ + k] - hc * ww
-            z = ws[parent + Z + k] + 2.0 * hc
+            rho = ws[parent + RHO] + hs
+            rhod = ws[parent + RHO_DOT] + hc * w
+            sumr = ws[parent + SUMR] - hs * ww
+            sumz = ws[parent + SUMZ] - hc * ww
+            z = ws[parent + Z] + 2.0 * hc
             fr = m * (sumr - rho * spin)
-            fz = m * (sumz + ws[here + GRAVITY + k])
+            fz = m * (sumz + ws[here + GRAVITY])
             dsc = difference * s * c
-            ws[here + PHI + k] = phi
-            ws[here + OMEGA + k] = w
-            ws[here + SPIN + k] = spin
-            ws[here + RHO + k] = rho + hs
-            ws[here + RHO_DOT + k] = rhod + hc * w
-            ws[here + SUMR + k] = sumr - hs * ww
-            ws[here + SUMZ + k] = sumz - hc * ww
-            ws[here + Z + k] = z
-            ws[here + LOWEST_Z + k] = min(ws[parent + LOWEST_Z + k], z)
-            ws[here + YAW_INERTIA + k] = ws[parent + YAW_INERTIA + k] + (
-                m * rho * rho + (difference * s * s + ws[here + AXIAL + k])
+            ws[here + PHI] = phi
+            ws[here + OMEGA] = w
+            ws[here + SPIN] = spin
+            ws[here + RHO] = rho + hs
+            ws[here + RHO_DOT] = rhod + hc * w
+            ws[here + SUMR] = sumr - hs * ww
+            ws[here + SUMZ] = sumz - hc * ww
+            ws[here + Z] = z
+            ws[here + LOWEST_Z] = min(ws[parent + LOWEST_Z], z)
+            ws[here + YAW_INERTIA] = ws[parent + YAW_INERTIA] + (
+                m * rho * rho + (difference * s * s + ws[here + AXIAL])
             )
-            ws[here + YAW_INERTIA_RATE + k] = ws[parent + YAW_INERTIA_RATE + k] + 2.0 * (m * rho * rhod + dsc * w)
-            ws[here + ER + k] = 2.0 * hc
-            ws[here + EZ + k] = -2.0 * hs
-            ws[here + FR + k] = fr
-            ws[here + FZ + k] = fz
-            ws[here + TORQUE_BIAS + k] = hc * fr - hs * fz - dsc * spin
+            ws[here + YAW_INERTIA_RATE] = ws[parent + YAW_INERTIA_RATE] + 2.0 * (m * rho * rhod + dsc * w)
+            ws[here + ER] = 2.0 * hc
+            ws[here + EZ] = -2.0 * hs
+            ws[here + FR] = fr
+            ws[here + FZ] = fz
+            ws[here + TORQUE_BIAS] = hc * fr - hs * fz - dsc * spin
             if TABLE:
-                table_contact(ws, here, k, rho + hs, rhod + hc * w, z, ws[parent + Z_DOT + k] - 2.0 * hs * w)
+                table_contact(ws, here, rho + hs, rhod + hc * w, z, ws[parent + Z_DOT] - 2.0 * hs * w)
             if DRIVE:
-                ws[here + BUS + k] = ws[parent + BUS + k] + ws[here + VOLTAGE + k] * ws[here + CURRENT + k]
+                ws[here + BUS] = ws[parent + BUS] + ws[here + VOLTAGE] * ws[here + CURRENT]
 
 
 @template
@@ -78,58 +79,60 @@ def inward(ws, n):
         FZ, TORQUE_BIAS, D, KRR, KRZ, KZZ, BR, BZ, B3, CONTACT_R, CONTACT_N, IR3, IZ3.
     Writes: D, KRR, KRZ, KZZ, BR, BZ, B3, IR3, IZ3, R.
     """
-    here = U(n * STRIDE)
-    parent = here - NEXT
+    record = U(n * STRIDE)
     for k in range(LANES):
-        payload = ws[parent + PAYLOAD + k]
-        ws[here + KRR + k] = payload
-        ws[here + KRZ + k] = 0.0
-        ws[here + KZZ + k] = payload
-        ws[here + IR3 + k] = 0.0
-        ws[here + IZ3 + k] = 0.0
-        ws[here + D + k] = 0.0
-        ws[here + BR + k] = payload * (ws[parent + SUMR + k] - ws[parent + RHO + k] * ws[parent + SPIN + k])
-        ws[here + BZ + k] = payload * (ws[parent + SUMZ + k] + ws[parent + GRAVITY + k])
-        ws[here + B3 + k] = 0.0
+        here = record + k
+        parent = here - NEXT
+        payload = ws[parent + PAYLOAD]
+        ws[here + KRR] = payload
+        ws[here + KRZ] = 0.0
+        ws[here + KZZ] = payload
+        ws[here + IR3] = 0.0
+        ws[here + IZ3] = 0.0
+        ws[here + D] = 0.0
+        ws[here + BR] = payload * (ws[parent + SUMR] - ws[parent + RHO] * ws[parent + SPIN])
+        ws[here + BZ] = payload * (ws[parent + SUMZ] + ws[parent + GRAVITY])
+        ws[here + B3] = 0.0
     for a in range(n - 1, 0, -1):
-        here = U(a * STRIDE)
-        child = here + NEXT
+        record = U(a * STRIDE)
         for k in range(LANES):
-            er = ws[here + ER + k]
-            ez = ws[here + EZ + k]
-            m = ws[here + MASS + k]
-            j = ws[here + ROTOR + k]
-            krr = ws[child + KRR + k]
-            krz = ws[child + KRZ + k]
-            kzz = ws[child + KZZ + k]
+            here = record + k
+            child = here + NEXT
+            er = ws[here + ER]
+            ez = ws[here + EZ]
+            m = ws[here + MASS]
+            j = ws[here + ROTOR]
+            krr = ws[child + KRR]
+            krz = ws[child + KRZ]
+            kzz = ws[child + KZZ]
             # The rest's rotational inertia, out of what the joint after this one keeps anyway: stores cost most here.
-            jd = ws[child + ROTOR + k] * ws[child + D + k]
-            kr3 = jd * ws[child + IR3 + k]
-            kz3 = jd * ws[child + IZ3 + k]
-            k33 = ws[child + ROTOR + k] - ws[child + ROTOR + k] * jd
-            br = ws[child + BR + k]
-            bz = ws[child + BZ + k]
+            jd = ws[child + ROTOR] * ws[child + D]
+            kr3 = jd * ws[child + IR3]
+            kz3 = jd * ws[child + IZ3]
+            k33 = ws[child + ROTOR] - ws[child + ROTOR] * jd
+            br = ws[child + BR]
+            bz = ws[child + BZ]
             if TABLE:
-                br -= ws[here + CONTACT_R + k]
-                bz -= ws[here + CONTACT_N + k]
+                br -= ws[here + CONTACT_R]
+                bz -= ws[here + CONTACT_N]
             gr = krr * er + krz * ez + kr3
             gz = krz * er + kzz * ez + kz3
             ir3 = 0.5 * m * er + gr
             iz3 = 0.5 * m * ez + gz
-            i33 = (ws[here + END_INERTIA + k] + k33) + (er * (gr + kr3) + ez * (gz + kz3))
-            u = ws[here + KM + k] * ws[here + CURRENT + k] - ws[here + DAMPING + k] * ws[here + Q_DOT + k]
+            i33 = (ws[here + END_INERTIA] + k33) + (er * (gr + kr3) + ez * (gz + kz3))
+            u = ws[here + KM] * ws[here + CURRENT] - ws[here + DAMPING] * ws[here + Q_DOT]
             if DRIVE:
-                u -= gear_friction(ws, here, k)
-            r = (u - ws[here + TORQUE_BIAS + k] - ws[child + B3 + k]) - (er * br + ez * bz)
+                u -= gear_friction(ws, here)
+            r = (u - ws[here + TORQUE_BIAS] - ws[child + B3]) - (er * br + ez * bz)
             d = 1.0 / (i33 + j)
             dr = d * r
-            ws[here + KRR + k] = m + krr - d * ir3 * ir3
-            ws[here + KRZ + k] = krz - d * ir3 * iz3
-            ws[here + KZZ + k] = m + kzz - d * iz3 * iz3
-            ws[here + BR + k] = ws[here + FR + k] + br + dr * ir3
-            ws[here + BZ + k] = ws[here + FZ + k] + bz + dr * iz3
-            ws[here + B3 + k] = u - j * dr
-            ws[here + IR3 + k] = ir3
-            ws[here + IZ3 + k] = iz3
-            ws[here + R + k] = r
-            ws[here + D + k] = d
+            ws[here + KRR] = m + krr - d * ir3 * ir3
+            ws[here + KRZ] = krz - d * ir3 * iz3
+            ws[here + KZZ] = m + kzz - d * iz3 * iz3
+            ws[here + BR] = ws[here + FR] + br + dr * ir3
+            ws[here + BZ] = ws[here + FZ] + bz + dr * iz3
+            ws[here + B3] = u - j * dr
+            ws[here + IR3] = ir3
+            ws[here + IZ3] = iz3
+            ws[here + R] = r
+            ws[here + D] = d

@@ -21,41 +21,42 @@ def rk4_stage(ws, n, weight, ahead, number):
     Writes: Q, Q_DOT, CURRENT, Q0, Q_DOT0, CURRENT0, Q_DOT_SUM, CURRENT_SUM.
     """
     for a in range(n):
-        here = U(a * STRIDE)
+        record = U(a * STRIDE)
         for k in range(LANES):
-            q_dot = ws[here + Q_DOT + k]
-            i = ws[here + CURRENT + k]
-            q0 = ws[here + Q + k] if number == 1 else ws[here + Q0 + k]
-            q_dot0 = q_dot if number == 1 else ws[here + Q_DOT0 + k]
-            i0 = i if number == 1 else ws[here + CURRENT0 + k]
-            resistance = ws[here + RESISTANCE + k]
+            here = record + k
+            q_dot = ws[here + Q_DOT]
+            i = ws[here + CURRENT]
+            q0 = ws[here + Q] if number == 1 else ws[here + Q0]
+            q_dot0 = q_dot if number == 1 else ws[here + Q_DOT0]
+            i0 = i if number == 1 else ws[here + CURRENT0]
+            resistance = ws[here + RESISTANCE]
             if DRIVE:
-                resistance = warm(ws, here, k, weight, ahead, number)
-            q_ddot = ws[here + Q_DDOT + k]
-            i_dot = (ws[here + NET + k] - resistance * i) * ws[here + INVERSE_L + k]
+                resistance = warm(ws, here, weight, ahead, number)
+            q_ddot = ws[here + Q_DDOT]
+            i_dot = (ws[here + NET] - resistance * i) * ws[here + INVERSE_L]
             kicked = weight * q_ddot
             charged = weight * i_dot
             if number == 1:
-                ws[here + Q0 + k] = q0
-                ws[here + Q_DOT0 + k] = q_dot0
-                ws[here + CURRENT0 + k] = i0
+                ws[here + Q0] = q0
+                ws[here + Q_DOT0] = q_dot0
+                ws[here + CURRENT0] = i0
             else:
-                kicked += ws[here + Q_DOT_SUM + k]
-                charged += ws[here + CURRENT_SUM + k]
+                kicked += ws[here + Q_DOT_SUM]
+                charged += ws[here + CURRENT_SUM]
             if number == 4:
                 # The angle's own increment, out of what the stages left behind: one row less to keep.
                 shift = ahead * q_dot0
-                turned = (shift + ahead * ws[here + Q_DOT_SUM + k]) - (ws[here + Q + k] - q0 - shift) * (1.0 / 3.0)
-                ws[here + Q + k] = q0 + (turned - weight * (q_dot - q_dot0))
-                ws[here + Q_DOT + k] = q_dot0 + kicked
-                ws[here + CURRENT + k] = i0 + charged
-                close_meters(ws, here, k)
+                turned = (shift + ahead * ws[here + Q_DOT_SUM]) - (ws[here + Q] - q0 - shift) * (1.0 / 3.0)
+                ws[here + Q] = q0 + (turned - weight * (q_dot - q_dot0))
+                ws[here + Q_DOT] = q_dot0 + kicked
+                ws[here + CURRENT] = i0 + charged
+                close_meters(ws, here)
             else:
-                ws[here + Q_DOT_SUM + k] = kicked
-                ws[here + CURRENT_SUM + k] = charged
-                ws[here + Q + k] = q0 + ahead * q_dot
-                ws[here + Q_DOT + k] = q_dot0 + ahead * q_ddot
-                ws[here + CURRENT + k] = i0 + ahead * i_dot
+                ws[here + Q_DOT_SUM] = kicked
+                ws[here + CURRENT_SUM] = charged
+                ws[here + Q] = q0 + ahead * q_dot
+                ws[here + Q_DOT] = q_dot0 + ahead * q_ddot
+                ws[here + CURRENT] = i0 + ahead * i_dot
     turn_plane(ws)
 
 

@@ -42,6 +42,12 @@ PARAMETER_ROWS = len(PARAMETERS)
 # below the table (accumulated), 1 while the state is representable, the largest vertical acceleration that an elbow has
 # in spite of its force, or that steps or friction left it [m/s^2], then one force per elbow.
 HAND, LOWEST, BELOW_TABLE, VALID, RESIDUAL, SUMMARY_COLUMNS = 0, 3, 4, 5, 6, 7
+# Columns of the arms' clock, (B, 2): steps of a timestep, and control periods since the reset.
+TIMESTEPS, PERIODS = 0, 1
+# Columns of what each arm is to do, (B, columns): the largest action, volts per unit of action, delay of actions in
+# control periods, the target's angle at the reset [rad], how far it turns in a control period [rad] and to the
+# look-ahead target [rad], and the energy paid so far [J].
+HIGHEST, VOLTS, DELAY, PHASE, TURN, AHEAD, PAID, TASK_COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7
 # Rows that `observe` fills beside the observation.
 FIGURES = (
     "tracking_error",

@@ -14,7 +14,7 @@ _C1, _C2, _C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015
 _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
 
 
-@template(inlined=True)
+@template(pure=True)
 def sincos(x):
     """Sine and cosine [-] of an angle [rad], to 1e-16 absolute for |x| < 1e5: no branch, no library call."""
     turns = (x * _TWO_OVER_PI + _ROUND) - _ROUND

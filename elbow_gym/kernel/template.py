@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 from numba import njit
 
+from elbow_gym.kernel.disk_cache import stored
+
 Entry = Callable[..., Any]
 """A compiled function."""
 
@@ -21,6 +23,8 @@ class Template(NamedTuple):
     """Whether the compiler's back end writes it into every caller."""
     flat: bool
     """Whether it is written into its caller before that is compiled: nested ones would be optimised once a level."""
+    pure: bool
+    """Whether it knows neither lanes nor switches, so that all kernels share one compiled copy."""
     entry: bool
     """Whether Python calls it; it is then cached on disk with all that it calls."""
 
@@ -29,30 +33,46 @@ TEMPLATES: dict[str, Template] = {}
 """Every template by its name."""
 
 
-def template(function: Any = None, *, inlined: bool = False, flat: bool = False, entry: bool = False) -> Any:
+def template(
+    function: Any = None, *, inlined: bool = False, flat: bool = False, pure: bool = False, entry: bool = False
+) -> Any:
     """Decorator that marks a function as a template, and leaves the function itself as it is.
 
     Args:
         function: the function; None where the decorator has arguments.
         inlined: compile it into every caller, for a body of a loop over lanes.
         flat: write it into its caller, for a sequence of passes that one place calls.
+        pure: all kernels share it, for a function of numbers alone.
         entry: Python calls it; it is cached on disk.
     """
     if function is None:
-        return partial(template, inlined=inlined, flat=flat, entry=entry)
-    TEMPLATES[function.__name__] = Template(function, inlined, flat, entry)
+        return partial(template, inlined=inlined, flat=flat, pure=pure, entry=entry)
+    TEMPLATES[function.__name__] = Template(function, inlined, flat, pure, entry)
     return function
 
 
 def compiled(function: Any, *, cached: bool = False, inlined: bool = False, flat: bool = False) -> Any:
-    """The compiled function, without a cache on disk where no folder can be written."""
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": inlined}
+    """The compiled function, without a cache on disk where no folder can be written.
+
+    Python can call it only if it is `cached`: the wrappers that calls from Python go through are half of what there is
+    to compile for a short function.
+    """
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": inlined, "no_cfunc_wrapper": True}
     if flat:
         options["inline"] = "always"
+    if not cached:
+        options["no_cpython_wrapper"] = True
+        return njit(**options)(function)
     try:
-        return njit(cache=cached, **options)(function)
+        return stored(njit(**options)(function))
     except RuntimeError:
         return njit(**options)(function)
+
+
+@cache
+def common_copy(function: Any, compile_with: Entry) -> Entry:
+    """The one compiled copy of a pure function."""
+    return compile_with(function, inlined=True)
 
 
 def compiled_entry(function: Any) -> Any:
@@ -87,6 +107,9 @@ def instances(known: dict[str, Any], suffix: str, compile_with: Entry = compiled
         space.update(each.function.__globals__)
     space.update(known)
     for name, each in TEMPLATES.items():
+        if each.pure:
+            space[name] = common_copy(each.function, compile_with)
+            continue
         copy = renamed(each.function, space, f"{name}_{suffix}")
         space[name] = compile_with(copy, cached=each.entry, inlined=each.inlined, flat=each.flat)
     return {name: space[name] for name, each in TEMPLATES.items() if each.entry}

@@ -102,7 +102,8 @@ def check_option(option: str, step: float, found: Mapping[str, float], integrato
         integrator: "exponential" or "rk4".
     """
     longest, name = limits(found, integrator)
-    if step > longest * (1.0 + HAIR):
+    # A rate beyond float64 is no number, which compares as false.
+    if not step <= longest * (1.0 + HAIR):
         raise ValueError(
             f"options[{option!r}] must allow substeps of {step:.3g} s, got {longest:.3g} s at most, for "
             f"{_cause(found, name)}"

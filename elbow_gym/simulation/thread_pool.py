@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import os
 import threading
+import time
 import weakref
 from collections.abc import Callable, Iterable
 from queue import SimpleQueue
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,22 +22,27 @@ class Answer(NamedTuple):
 
 
 class Task(NamedTuple):
-    """A share of the arms, what to do with it, and where the answer goes."""
+    """What to do, with what, the range of arms last, and where the answer goes."""
 
-    work: Callable[[int, int], int]
-    first: int
-    end: int
+    work: Callable[..., int]
+    arguments: tuple[Any, ...]
     answers: SimpleQueue[Answer]
 
 
 Inbox = SimpleQueue[Task | None]
 
+NOBODY = 0
+"""Process that threads which have not been started belong to."""
+SETTLING = 1e-4
+"""Time between two looks at threads that finish what an error has left [s]."""
+
 
 class Sharing:
     """Runs a function over ranges of arms, one range per thread.
 
-    The threads live as long as this object: what `concurrent.futures` makes anew for every task costs a control step
-    some twenty microseconds.
+    The threads are started by the first call and live until `close` or as long as this object: what
+    `concurrent.futures` makes anew for every task costs a control step some twenty microseconds. A forked process has
+    none of its parent's threads and starts its own.
 
     Args:
         num_envs: the number of arms.
@@ -47,27 +54,65 @@ class Sharing:
         blocks = -(-num_envs // lanes)
         edges = np.linspace(0, blocks, min(num_threads, blocks) + 1).round().astype(int) * lanes
         self._shares = [(int(a), min(int(b), num_envs)) for a, b in itertools.pairwise(edges)]
-        self._inboxes: list[Inbox] = [SimpleQueue() for _ in self._shares[1:]]
-        for inbox in self._inboxes:
-            threading.Thread(target=_serve, args=(inbox,), name="elbow_gym", daemon=True).start()
-        weakref.finalize(self, _dismiss, self._inboxes)
+        self._process = NOBODY
+        self._inboxes: list[Inbox] = []
+        self._threads: list[threading.Thread] = []
 
-    def total(self, work: Callable[[int, int], int]) -> int:
-        """The sum of `work(first, end)` over all shares, when every one is done."""
-        if not self._inboxes:
-            return work(*self._shares[0])
+    def _start(self) -> None:
+        self._inboxes = [SimpleQueue() for _ in self._shares[1:]]
+        self._threads = [
+            threading.Thread(target=_serve, args=(inbox,), name="elbow_gym", daemon=True) for inbox in self._inboxes
+        ]
+        for thread in self._threads:
+            thread.start()
+        weakref.finalize(self, _dismiss, self._inboxes)
+        self._process = os.getpid()
+
+    def close(self) -> None:
+        """Ends the threads, each after what it works on. May be called twice; the next `total` starts new ones."""
+        if self._process == os.getpid():
+            _dismiss(self._inboxes)
+            for thread in self._threads:
+                thread.join()
+        self._process, self._inboxes, self._threads = NOBODY, [], []
+
+    def total(self, work: Callable[..., int], *arguments: Any) -> int:
+        """The sum of `work(*arguments, first, end)` over all shares, when every one is done.
+
+        An error of a share, or an interrupt, is raised when no share is worked on any more.
+        """
+        if len(self._shares) == 1:
+            return work(*arguments, *self._shares[0])
+        if self._process != os.getpid():
+            self._start()
         # New for every call, so that an answer which an interrupt left behind is never taken for a later one's.
         answers: SimpleQueue[Answer] = SimpleQueue()
-        for inbox, share in zip(self._inboxes, self._shares[1:], strict=True):
-            inbox.put(Task(work, *share, answers))
-        # This thread takes the first share itself: one hand-over less.
-        total = work(*self._shares[0])
-        for _ in self._inboxes:
-            answer = answers.get()
+        try:
+            for inbox, share in zip(self._inboxes, self._shares[1:], strict=True):
+                inbox.put(Task(work, (*arguments, *share), answers))
+            # This thread takes the first share itself: one hand-over less.
+            total = work(*arguments, *self._shares[0])
+            given = [answers.get() for _ in self._inboxes]
+        except BaseException:
+            self._settle()
+            raise
+        for answer in given:
             if answer.error is not None:
                 raise answer.error
             total += answer.value
         return total
+
+    def _settle(self) -> None:
+        """Waits until the threads have done all that they were given, however much of that an interrupt let through."""
+        done: SimpleQueue[Answer] = SimpleQueue()
+        for inbox in self._inboxes:
+            inbox.put(Task(_nothing, (), done))
+        while done.qsize() < len(self._inboxes):
+            time.sleep(SETTLING)
+
+
+def _nothing() -> int:
+    return 0
 
 
 def _serve(inbox: Inbox) -> None:
@@ -80,7 +125,7 @@ def _done(task: Task | None) -> bool:
     if task is None:
         return False
     try:
-        answer = Answer(task.work(task.first, task.end))
+        answer = Answer(task.work(*task.arguments))
     except BaseException as error:
         answer = Answer(0, error)
     task.answers.put(answer)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from elbow_gym.kernel.rows import DELAY, HIGHEST, VOLTS
 from elbow_gym.parameters import Array
 from elbow_gym.task.arm_batch import Population
 from elbow_gym.task.settings import Settings
@@ -18,17 +19,16 @@ class Actuation:
     Args:
         settings: the environment's arguments.
         population: the arms' parameters.
-        num_envs: B, the number of arms.
+        task: the kernel's columns of what the arms are to do, (B, TASK_COLUMNS); these are kept up to date here:
+            largest action, volts per unit of action and delay.
     """
 
-    def __init__(self, settings: Settings, population: Population, num_envs: int) -> None:
-        self._population = population
+    def __init__(self, settings: Settings, population: Population, task: Array) -> None:
+        self._population, self._task = population, task
         self._fraction = settings.action_unit == "fraction"
         self._longest_delay = int(settings.randomization.highest("action_delay"))
-        self.queue = np.zeros((num_envs, self._longest_delay + 1, settings.parsed_arm.n_joints))
+        self.queue = np.zeros((len(task), self._longest_delay + 1, settings.parsed_arm.n_joints))
         """Voltages asked for, newest first [V], (B, 1 + longest delay, n)."""
-        self._supply, self._one = np.ones(num_envs), np.ones(num_envs)
-        self._late = np.zeros(num_envs, dtype=np.int64)
         self.take_values()
 
     def check(self, values: Mapping[str, Array]) -> None:
@@ -46,13 +46,6 @@ class Actuation:
 
     def take_values(self) -> None:
         """Takes over the supply voltages [V] and action delays [control periods] of the arms' values."""
-        self._supply[:] = self._population.values["supply_voltage"]
-        self._late[:] = self._population.values["action_delay"]
-
-    def arguments(self) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-        """The kernel's arguments: largest action (B,), volts per unit of action (B,), queue and delays (B,).
-
-        The arrays are this object's own and are brought up to date in place.
-        """
-        scales = (self._one, self._supply) if self._fraction else (self._supply, self._one)
-        return (*scales, self.queue, self._late)
+        supply = self._population.values["supply_voltage"]
+        self._task[:, HIGHEST], self._task[:, VOLTS] = (1.0, supply) if self._fraction else (supply, 1.0)
+        self._task[:, DELAY] = self._population.values["action_delay"]

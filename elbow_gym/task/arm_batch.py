@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from elbow_gym.checks import as_dict, require_entries, saved_rows
 from elbow_gym.parameters import ArmParameters, Array
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import parameter_rows, quantities
-from elbow_gym.task.randomization import FACTORS, NUMBERS, Randomization
+from elbow_gym.task.randomization import FACTORS, NUMBERS, POSITIVE, Randomization
 
 
 class Population:
@@ -49,18 +50,46 @@ class Population:
         }
 
     def put(self, chosen: NDArray[np.int64], values: Mapping[str, Array]) -> Array:
-        """Takes over values of the chosen arms (k,); returns their rows for the kernel, (k, PARAMETER_ROWS, n)."""
+        """Takes over values of the chosen arms, of k or of one for all; returns the values' rows for the kernel."""
         for name, rows in values.items():
             self.values[name][chosen] = rows
-        k = len(chosen)
+        return self.rows(values)
+
+    def rows(self, values: Mapping[str, Array]) -> Array:
+        """The kernel's rows of values of k arms by name, (k, PARAMETER_ROWS, n)."""
+        k = len(values["payload"])
         every = {name: np.repeat(value[None], k, axis=0) for name, value in self.nominal.items() if value.ndim}
         every |= {name: values[name] for name in FACTORS}
-        return parameter_rows(every, self._arm.gravity, self._conditions, values["payload"], values["supply_voltage"])
+        load, supply = values["payload"], values["supply_voltage"]
+        # What is beyond float64 makes rates that the steps' check refuses.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return parameter_rows(every, self._arm.gravity, self._conditions, load, supply)
+
+    def checked(self, values: object, count: int) -> dict[str, Array]:
+        """Values of `count` arms by name from a saved state. Raises ValueError naming one that no arm can have."""
+        given = as_dict("state['parameters']", values)
+        require_entries(given, self.values, "state['parameters']")
+        saved = {
+            name: saved_rows(f"state['parameters'][{name!r}]", given[name], own, count)
+            for name, own in self.values.items()
+        }
+        for name, array in saved.items():
+            least = array[:, 1:].min() if name == "length" else array.min()
+            if least < 0.0 or (least == 0.0 and name in POSITIVE):
+                rule = "be positive" if name in POSITIVE else "not be negative"
+                raise ValueError(f"state['parameters'][{name!r}] must {rule}, got {least:g}")
+        if saved["length"][:, 0].any():
+            raise ValueError("state['parameters']['length'] must be zero for link 1, got another")
+        return saved
 
     @property
     def changed(self) -> bool:
         """Whether any arm's values differ from the nominal ones."""
-        return any(bool((value != self.nominal[name]).any()) for name, value in self.values.items())
+        return self.differ(self.values)
+
+    def differ(self, values: Mapping[str, Array]) -> bool:
+        """Whether any of these values of arms, by name, differ from the nominal ones."""
+        return any(bool((value != self.nominal[name]).any()) for name, value in values.items())
 
     def arms(self, chosen: NDArray[np.int64]) -> list[ArmParameters]:
         """Parameters of the chosen arms (k,) with their drawn lengths, for kinematics."""

@@ -13,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elbow_gym.checks import check_entries, finite, positive
+from elbow_gym.checks import check_entries, finite, is_finite, positive
 from elbow_gym.kernel import observe
 from elbow_gym.parameters import ArmParameters, Array
 from elbow_gym.task.fourier_path import (
@@ -71,7 +71,7 @@ class Circle:
             "phase": _phase(self.phase),
             "shape": as_shape(self.shape),
         }
-        if self.direction not in (*DIRECTIONS, "random"):
+        if not isinstance(self.direction, str) or self.direction not in (*DIRECTIONS, "random"):  # pyright: ignore
             raise ValueError(f'circle direction must be one of {DIRECTIONS} or "random", got {self.direction!r}')
         for name, value in checked.items():
             object.__setattr__(self, name, value)
@@ -193,13 +193,15 @@ def _points(path: Array, angle: ArrayLike) -> Array:
 
 
 def _center(center: object) -> tuple[Range, Range, Range]:
-    if not isinstance(center, list | tuple | np.ndarray) or len(cast("Sequence[object]", center)) != 3:
+    if isinstance(center, np.ndarray):
+        center = cast("object", center.tolist())
+    if not isinstance(center, list | tuple) or len(cast("Sequence[object]", center)) != 3:
         raise ValueError(f"circle center must have three coordinates, got {center!r}")
     listed = cast("Sequence[Any]", center)
     bounds = [end for coordinate in listed for end in (coordinate if is_pair(coordinate) else (coordinate,))]
     if not all(isinstance(end, numbers.Real) for end in bounds):
         raise ValueError(f"circle center must be three numbers or pairs [low, high], got {center!r}")
-    if not all(math.isfinite(end) for end in bounds):
+    if not all(is_finite(end) for end in bounds):
         raise ValueError(f"circle center must be finite, got {center!r}")
     x, y, z = (as_range("circle center", coordinate, finite) for coordinate in listed)
     return x, y, z
@@ -227,10 +229,9 @@ def as_phase(phase: object) -> float:
     """A phase [rad] as a float; ValueError unless it is a finite number."""
     if isinstance(phase, bool) or not isinstance(phase, numbers.Real):
         raise ValueError(f"phase must be an angle in rad, got {phase!r}")
-    if not math.isfinite(phase):
-        raise ValueError(f"phase must be finite, got {phase!r}")
+    angle = finite("phase", phase)
     # The target needs the angle alone; whole turns would cost it digits.
-    return math.remainder(phase, 2.0 * math.pi) if abs(float(phase)) > 1e3 else float(phase)
+    return math.remainder(angle, 2.0 * math.pi) if abs(angle) > 1e3 else angle
 
 
 def as_circle(circle: object) -> Circle:
@@ -249,7 +250,7 @@ def check_reachable(arm: ArmParameters, elbows: Sequence[int], circle: Circle) -
 
     Covers every circle that may be drawn. Where lengths are random too, give the arm with the shortest ones.
     """
-    points = _extreme_points(circle)
+    points = extreme_points(circle)
     shortfall = reach_shortfall(arm, elbows, points)
     worst = int(shortfall.argmax())
     if shortfall[worst] > 0.0:
@@ -260,7 +261,7 @@ def check_reachable(arm: ArmParameters, elbows: Sequence[int], circle: Circle) -
         )
 
 
-def _extreme_points(circle: Circle) -> Array:
+def extreme_points(circle: Circle) -> Array:
     """Points (m, 3) that are out of reach whenever a point of any circle that may be drawn is.
 
     Outward the shortfall is convex in the point, and the point affine in the centre (in the radial plane: in its height

@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym.checks import check_restorable, require_entries, restore
+from elbow_gym.checks import as_dict, require_entries
 from elbow_gym.kernel import observe
-from elbow_gym.kernel.rows import FIGURES, RESIDUAL, SUMMARY_COLUMNS
+from elbow_gym.kernel.rows import FIGURES, PAID, PARAMETERS, RESIDUAL, SUMMARY_COLUMNS, TASK_COLUMNS
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.parameters import Array
-from elbow_gym.simulation.rates import Start, rates
-from elbow_gym.simulation.step_limit import check_option
+from elbow_gym.simulation.writable import take_over
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.actuation import Actuation
 from elbow_gym.task.arm_batch import Population
-from elbow_gym.task.circle import Circle, check_reachable
+from elbow_gym.task.circle import check_reachable
 from elbow_gym.task.reward import Price, early_end
+from elbow_gym.task.saved_state import check_basis, checked_rows, rows_of
 from elbow_gym.task.sensing import Sensing, Snapshot, blank
 from elbow_gym.task.settings import Settings
-from elbow_gym.task.start import above_table, checked_state, given_state
+from elbow_gym.task.start import checked_state, drawn_poses, given_state
 from elbow_gym.task.targets import Targets
 
 RESET_OPTIONS = ("state", "phase", "circle", "parameters")
@@ -66,13 +66,14 @@ class Episodes:
         )
         self.simulator.period = settings.control_period
         self.num_envs = num_envs
-        self.tracking_weight = float(settings.tracking_weight)
-        self.energy_weight = float(settings.energy_weight)
+        weights = float(settings.tracking_weight), float(settings.energy_weight)
+        self._price = np.array(Price(*weights, settings.control_frequency, settings.regeneration))
         self.pose = self.simulator.on_table(self.arm.nominal_pose)[0]
         """Start pose [rad], (n,): the nominal one, on the elbows' plane. Observed angles count from it."""
         self.population = Population(self.arm, settings.conditions, settings.randomization, num_envs)
-        self.targets = Targets(self.circle, num_envs, settings.control_period)
-        self.actuation = Actuation(settings, self.population, num_envs)
+        self._task = np.zeros((num_envs, TASK_COLUMNS))
+        self.targets = Targets(self.circle, self._task, settings.control_period)
+        self.actuation = Actuation(settings, self.population, self._task)
         self.sensing = Sensing(settings, self.simulator, self.population, self.actuation.queue)
         self.layout = self.sensing.layout
         self._substeps = settings.substeps
@@ -81,14 +82,14 @@ class Episodes:
         self._arms_differ, self._circles_differ = bool(settings.randomization.ranges), self.circle.random
         if settings.start == "on_target" and not self.circle.random:
             inverse_kinematics(self.arm, self.pose, self.circle.position(np.linspace(0.0, 2.0 * np.pi, 73)))
-        self._steps = np.zeros(num_envs, dtype=np.int64)
-        self._spent = np.zeros(num_envs)
         # Arrays that every control period reads and resets bring up to date in place.
-        self._actuated = self.actuation.arguments()
         layout, self._size = self.layout, self.layout.size
-        self._observed = (
-            self.pose, *self.targets.arguments(self._steps), layout.starts, layout.scale, layout.high,
-        )  # fmt: skip
+        scales = np.stack([layout.scale, layout.high])
+        self._asked = (self._task, self.targets.path, self.pose, layout.starts, scales)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        take_over(self, self.population, self.targets, self.actuation, self.sensing)
 
     @property
     def highest_action(self) -> float:
@@ -99,6 +100,24 @@ class Episodes:
     def volts_per_action(self) -> float:
         """Terminal voltage per unit of action at the nominal supply voltage [V]."""
         return float(self.settings.voltage_limit) / self.highest_action
+
+    @property
+    def tracking_weight(self) -> float:
+        """Cost per metre of tracking error [1/m], from the next step on."""
+        return float(self._price[0])
+
+    @tracking_weight.setter
+    def tracking_weight(self, weight: float) -> None:
+        self._price[0] = weight
+
+    @property
+    def energy_weight(self) -> float:
+        """Cost per watt of electrical power [1/W], from the next step on."""
+        return float(self._price[1])
+
+    @energy_weight.setter
+    def energy_weight(self, weight: float) -> None:
+        self._price[1] = weight
 
     def target(self) -> Array:
         """Present position of each target [m], (B, 3)."""
@@ -114,36 +133,44 @@ class Episodes:
 
         Options: `state`, a dict of q [rad] and, if wanted, q_dot [rad/s], current [A] and temperature_rise [K]; `phase`
         [rad]; `circle`, a dict of `Circle` fields instead of the environment's; `parameters`, a dict of values instead
-        of drawn ones. Raises ValueError naming the option, with everything but the generators as it was.
+        of drawn ones. Raises ValueError naming the option, with everything as it was, the generators included.
         """
-        options = {} if options is None else options
-        unknown = sorted(set(options) - set(RESET_OPTIONS))
+        options = {} if options is None else as_dict("options", options)
+        unknown = sorted(set(options) - set(RESET_OPTIONS), key=str)
         if unknown:
             raise ValueError(f"options must have only the entries {list(RESET_OPTIONS)}, got {unknown[0]!r}")
         chosen = np.flatnonzero(np.ones(self.num_envs, dtype=np.bool_) if mask is None else mask)
         state = given_state(options.get("state"))
-        circle = self._given_circle(options.get("circle"))
+        circle = self.settings.given_circle(options.get("circle"))
+        drawing = [generators[int(i)] for i in chosen]
         before = self.population.copy(), self.simulator.parameters(chosen)
+        undrawn = [generator.bit_generator.state for generator in drawing]
         try:
-            drawing = [generators[int(i)] for i in chosen]
             self._draw_arms(drawing, chosen, options.get("parameters"))
             if state is not None:
-                self._check_steps("state", chosen, checked_state(self.simulator, state, mask))
+                start = checked_state(self.simulator, state, mask)
+                volts = self.population.values["supply_voltage"][chosen]
+                self.settings.check_steps("state", self.simulator.parameters(chosen), volts, start)
             circles = self.targets.draw(circle, drawing, options.get("phase"))
             self.targets.check(circles)
             if state is None:
-                state = {"q": self._draw_pose(drawing, circles, chosen)}
+                state = {
+                    "q": drawn_poses(
+                        self.settings, self.simulator, self.population, self.pose, drawing, circles, chosen
+                    )
+                }
             self.simulator.reset(**state, mask=mask)
-        except ValueError:
+        except BaseException:
             self.population.values = before[0]
             self.simulator.set_parameters(chosen, before[1])
+            for generator, state_before in zip(drawing, undrawn, strict=True):
+                generator.bit_generator.state = state_before
             raise
         self._arms_differ = self._differing()
         self.targets.put(chosen, circles)
         self.actuation.reset(chosen)
         self.sensing.set_noise(chosen, drawing)
-        self._steps[chosen] = 0
-        self._spent[chosen] = 0.0
+        self._task[chosen, PAID] = 0.0
 
     def _differing(self) -> bool:
         """Whether infos tell the arms' parameters: they are drawn, or some arm was given others than the nominal."""
@@ -155,46 +182,12 @@ class Episodes:
         values = self.population.draw(generators, given)
         self.actuation.check(values)
         rows = self.population.put(chosen, values)
-        self.simulator.set_parameters(chosen, rows)
-        if given is not None:
-            self._check_steps("parameters", chosen)
         if given is not None and "length" in given:
             for arm in self.population.arms(chosen):
                 check_reachable(arm, self.settings.elbow_joints, self.circle)
-
-    def _check_steps(self, option: str, chosen: NDArray[np.int64], start: Start | None = None) -> None:
-        """Raises ValueError naming the option unless the steps resolve the chosen arms, put in the states given."""
-        settings, rows = self.settings, self.simulator.parameters(chosen)
-        volts = self.population.values["supply_voltage"][chosen]
-        found = rates(rows, settings.conditions, volts, elbows=bool(settings.elbow_joints), start=start)
-        check_option(option, float(self._substeps.max()), found, settings.integrator)
-
-    def _given_circle(self, given: object) -> Circle:
-        if given is None:
-            return self.circle
-        if not isinstance(given, Mapping):
-            raise ValueError(f"options['circle'] must be a dict of circle fields, got {given!r}")
-        circle = Circle.from_dict({**self.circle.to_dict(), **cast("Mapping[str, Any]", given)})
-        check_reachable(self.arm, self.settings.elbow_joints, circle)
-        return circle
-
-    def _draw_pose(
-        self, generators: Sequence[np.random.Generator], circles: Sequence[Circle], chosen: NDArray[np.int64]
-    ) -> Array:
-        settings = self.settings
-        noise, moved = settings.start_noise, "length" in settings.randomization.ranges
-        moved = moved or self.population.changed
-        q = np.tile(self.pose, (self.num_envs, 1))
-        if moved:
-            q = self.simulator.on_table(q)
-        if settings.start == "on_target":
-            arms = self.population.arms(chosen) if moved else [self.arm] * len(chosen)
-            for i, arm, circle in zip(chosen, arms, circles, strict=True):
-                q[i] = inverse_kinematics(arm, q[i], circle.position(float(circle.phase)))[0]
-        if noise > 0.0:
-            q[chosen] += noise * np.stack([generator.standard_normal(self.arm.n_joints) for generator in generators])
-            q = self.simulator.on_table(q)
-        return q if settings.conditions.surface is None else above_table(self.simulator, q)
+        self.simulator.set_parameters(chosen, rows)
+        if given is not None:
+            self.settings.check_steps("parameters", rows, values["supply_voltage"])
 
     def step(self, action: Array, waiting: NDArray[np.bool_] | None = None) -> Outcome:
         """One control period under `action`, held and clipped to the supply voltage.
@@ -203,29 +196,25 @@ class Episodes:
 
         Raises ValueError, with the state untouched, when an action is not a number.
         """
-        settings = self.settings
-        price = (self.tracking_weight, self.energy_weight, settings.control_frequency, settings.regeneration)
         snapshot, voltage = blank(self.num_envs, self._size), np.empty_like(action)
-        self._steps += 1
         invalid = self.simulator.control_step(
-            (action, voltage, *self._actuated), self._substeps, (*self._observed, price, self._spent, *snapshot)
+            (action, voltage, self.actuation.queue), self._substeps, (*self._asked, self._price, *snapshot)
         )
         if invalid < 0:
-            self._steps -= 1
             raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
         self.sensing.complete(snapshot.observation, waiting)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
-        truncated = self._steps >= self.horizon
+        truncated = self.simulator.periods >= self.horizon
         if invalid:
             terminated = ~self.simulator.valid
-            self._charge_the_rest(terminated, snapshot, Price(*price))
+            self._charge_the_rest(terminated, snapshot, Price(*self._price.tolist()))
             truncated &= ~terminated
         info = self.info(snapshot, voltage)
         return Outcome(snapshot.observation, snapshot.figure("reward"), terminated, truncated, info)
 
     def _charge_the_rest(self, terminated: NDArray[np.bool_], snapshot: Snapshot, price: Price) -> None:
         """Charges terminated arms the worst reward for the remaining time, this control period included."""
-        rest = np.maximum(self.settings.horizon - self._steps + 1, 1)[terminated]
+        rest = np.maximum(self.settings.horizon - self.simulator.periods + 1, 1)[terminated]
         values = self.population.values
         motors = values["supply_voltage"][terminated], values["armature_resistance"][terminated]
         charge = early_end(self.layout, *motors, price, rest)
@@ -235,17 +224,16 @@ class Episodes:
 
     def angle(self) -> Array:
         """Present angle of each target on its path [rad], (B,)."""
-        return self.targets.angle(self._steps)
+        return self.targets.angle(self.simulator.periods)
 
     def observe(self, resting: NDArray[np.bool_] | None = None) -> Snapshot:
         """Observations of every arm now, between control periods: power and rewards are zero.
 
         Arms of the mask `resting` draw no noise, since they have not been reset.
         """
-        price = (0.0, 0.0, 0.0, self.settings.regeneration)
+        price = self._price * (0.0, 0.0, 0.0, 1.0)
         snapshot = blank(self.num_envs, self._size)
-        observed = (*self._observed, price, self._spent, *snapshot)
-        observe.observe(*self.simulator.raw, *observed, 0, self.num_envs)
+        observe.observe(*self.simulator.raw, *self._asked, price, *snapshot, 0, self.num_envs)
         self.sensing.complete(snapshot.observation, resting)
         return snapshot
 
@@ -266,22 +254,46 @@ class Episodes:
             info["circle"] = self.targets.figures()
         return info
 
-    def get_state(self) -> dict[str, Any]:
-        """A copy of everything that changes from step to step, except the generators."""
-        own = {"steps": self._steps.copy(), "spent": self._spent.copy()}
-        parts = {"targets": self.targets.get_state(), "parameters": self.population.copy()}
-        return {"simulator": self.simulator.get_state(), **parts, "queue": self.actuation.queue.copy(), **own}
+    def _own(self) -> dict[str, NDArray[Any]]:
+        """Arrays of the running state by name, apart from the simulator's own; `steps` is a view of its clock."""
+        kernels = {"steps": self.simulator.periods, "spent": self._task[:, PAID]}
+        return {**kernels, "queue": self.actuation.queue, "noise": self.sensing.noise}
 
-    def set_state(self, state: Mapping[str, Any], generators: Sequence[np.random.Generator]) -> None:
-        """Restores a state of `get_state` of the same settings and number of arms; takes each arm's generator."""
-        own = {"steps": self._steps, "spent": self._spent, "queue": self.actuation.queue}
-        require_entries(state, (*own, "simulator", "targets", "parameters"), "state")
-        check_restorable(own, state)
-        self.simulator.set_state(state["simulator"])
-        self.targets.set_state(state["targets"])
-        everyone = np.arange(self.num_envs)
-        self.simulator.set_parameters(everyone, self.population.put(everyone, state["parameters"]))
-        restore(own, state)
+    def get_state(self, chosen: NDArray[np.int64] | None = None) -> dict[str, Any]:
+        """A copy of everything that changes from step to step in the chosen arms (all when None), but the generators.
+
+        `settings` are what the state rests on.
+        """
+        parts = {"targets": self.targets.get_state(), "parameters": self.population.values, **self._own()}
+        running = {"simulator": self.simulator.get_state(), **parts}
+        chosen = np.arange(self.num_envs) if chosen is None else chosen
+        return {"settings": dict(self.settings.basis), **rows_of(running, chosen)}
+
+    def checked(self, state: object, count: int) -> dict[str, Any]:
+        """A saved state of `count` arms, for `put`. Raises ValueError naming what these episodes cannot go on from."""
+        given = as_dict("state['episodes']", state)
+        require_entries(given, ("settings", "simulator", "targets", "parameters"), "state['episodes']")
+        check_basis(self.settings.basis, given["settings"])
+        saved: dict[str, Any] = {**checked_rows(self._own(), given, count)}
+        values = self.population.checked(given["parameters"], count)
+        self.actuation.check(values)
+        rows = self.population.rows(values)
+        if self.population.differ(values):
+            self.settings.check_steps("parameters", rows, values["supply_voltage"])
+        saved["simulator"] = self.simulator.checked(given["simulator"], rows[:, PARAMETERS.index("length")])
+        return {**saved, "parameters": values, "circles": self.targets.checked(given["targets"], count)}
+
+    def put(
+        self, chosen: NDArray[np.int64], saved: Mapping[str, Any], generators: Sequence[np.random.Generator]
+    ) -> None:
+        """Gives the chosen arms, (k,), what `checked` has passed, of k arms or of one for all, and their generators."""
+        self.simulator.put(chosen, saved["simulator"])
+        for name, array in self._own().items():
+            array[chosen] = saved[name]
+        circles = saved["circles"]
+        self.targets.put(chosen, circles * len(chosen) if len(circles) == 1 else circles)
+        rows = self.population.put(chosen, saved["parameters"])
+        self.simulator.set_parameters(chosen, rows)
         self.actuation.take_values()
-        self.sensing.set_noise(everyone, generators)
+        self.sensing.set_noise(chosen, generators)
         self._arms_differ = self._differing()

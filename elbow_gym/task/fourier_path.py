@@ -10,6 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elbow_gym.checks import is_finite
 from elbow_gym.parameters import Array
 
 Point = tuple[float, float, float]
@@ -33,7 +34,9 @@ def as_shape(shape: object) -> str | tuple[Point, ...]:
     """A shape's name, or three or more points of a path [m]. Raises ValueError on anything else."""
     if isinstance(shape, str) and shape in SHAPES:
         return shape
-    if not isinstance(shape, list | tuple | np.ndarray):
+    if isinstance(shape, np.ndarray):
+        shape = cast("object", shape.tolist())
+    if not isinstance(shape, list | tuple):
         raise ValueError(f"circle shape must be one of {SHAPES} or a list of points, got {shape!r}")
     points = cast("Sequence[object]", shape)
     if len(points) < 3:
@@ -42,9 +45,11 @@ def as_shape(shape: object) -> str | tuple[Point, ...]:
 
 
 def _as_point(point: object) -> Point:
-    if isinstance(point, list | tuple | np.ndarray):
+    if isinstance(point, np.ndarray):
+        point = cast("object", point.tolist())
+    if isinstance(point, list | tuple):
         entries = cast("Sequence[object]", point)
-        if len(entries) == 3 and all(isinstance(entry, numbers.Real) and math.isfinite(entry) for entry in entries):
+        if len(entries) == 3 and all(isinstance(entry, numbers.Real) and is_finite(entry) for entry in entries):
             x, y, z = (float(cast("float", entry)) for entry in entries)
             return x, y, z
     raise ValueError(f"circle shape must have points of three finite numbers, got {point!r}")

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from elbow_gym.checks import check_entries, non_negative, positive
+from elbow_gym.checks import check_entries, non_negative, positive, real, shown
 from elbow_gym.parameters import Array
 from elbow_gym.task.ranges import Range, as_range, ends
 
@@ -24,6 +24,10 @@ FACTORS = (
 MAY_BE_ZERO = ("joint_viscous_friction", "gear_viscous_friction", "gear_coulomb_friction")
 # One number per arm: a factor on the nominal supply voltage, then values.
 NUMBERS = ("supply_voltage", "payload", "sensor_noise", "action_delay")
+POSITIVE = tuple(
+    name for name in (*FACTORS, *NUMBERS) if name not in (*MAY_BE_ZERO, "payload", "sensor_noise", "action_delay")
+)
+"""Quantities that are above zero, but for the length of link 1, which only yaws."""
 
 
 def _count(name: str, value: object) -> float:
@@ -95,17 +99,17 @@ class Randomization:
         checked: dict[str, Array] = {}
         for name, value in plain.items():
             try:
-                array = np.broadcast_to(np.asarray(value, dtype=np.float64), nominal[name].shape).copy()
-            except (TypeError, ValueError) as error:
+                array = np.broadcast_to(np.asarray(real(value), dtype=np.float64), nominal[name].shape).copy()
+            except (OverflowError, TypeError, ValueError) as error:
                 shape = nominal[name].shape
                 raise ValueError(
-                    f"options['parameters'][{name!r}] must be numbers of shape {shape}, got {value!r}"
+                    f"options['parameters'][{name!r}] must be numbers of shape {shape}, got {shown(value)}"
                 ) from error
             check = _count if name == "action_delay" else non_negative
             for entry in array.ravel():
                 check(f"options['parameters'][{name!r}]", float(entry))
             links = array[1:] if name == "length" else array
-            if name not in (*MAY_BE_ZERO, "payload", "sensor_noise", "action_delay") and not (links > 0.0).all():
+            if name in POSITIVE and not (links > 0.0).all():
                 raise ValueError(f"options['parameters'][{name!r}] must be positive, got {value!r}")
             if name == "length":
                 array[0] = 0.0

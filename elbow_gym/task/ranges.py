@@ -6,13 +6,16 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 Range: TypeAlias = float | tuple[float, float]
 
 
 def is_pair(value: object) -> bool:
     """Whether a value has the form of a range: two entries."""
-    return isinstance(value, list | tuple | np.ndarray) and len(cast("Sequence[object]", value)) == 2
+    if isinstance(value, np.ndarray):
+        return cast("NDArray[Any]", value).shape == (2,)
+    return isinstance(value, list | tuple) and len(cast("Sequence[object]", value)) == 2
 
 
 def as_range(name: str, value: Any, check: Callable[[str, object], float]) -> Range:

@@ -51,6 +51,8 @@ class Sensing:
         self._limits = simulator.arm.of_motors("temperature_limit")
         self._generators: list[np.random.Generator] = []
         self._noisy = False
+        self.noise: Array
+        """Noise that each arm's observation was last shown with, in its units, (B, entries that have noise)."""
         sizes = {
             "contact_force": n - 1 if settings.conditions.surface is not None else 0,
             "temperature_rise": n if settings.heat else 0,
@@ -63,6 +65,7 @@ class Sensing:
         self._switched = [name for name, size in sizes.items() if size]
         self.layout = ObservationLayout(n, sizes)
         """The observation's entries, those of the switched-on features included."""
+        self.noise = np.zeros((simulator.num_envs, int(self.layout.slices["target_angle"].start)))
 
     def set_noise(self, chosen: NDArray[np.int64], generators: Sequence[np.random.Generator]) -> None:
         """Sets the chosen arms' generators of noise, and its standard deviations from the arms' values."""
@@ -71,9 +74,11 @@ class Sensing:
         for i, generator in zip(chosen, generators, strict=True):
             self._generators[int(i)] = generator
         self._noisy = bool(self._population.values["sensor_noise"].any())
+        if not self._noisy:
+            self.noise[:] = 0.0
 
     def complete(self, observation: NDArray[np.float32], resting: NDArray[np.bool_] | None) -> None:
-        """Fills the switched-on features of observations (B, size), and adds noise for arms that do not rest."""
+        """Fills the switched-on features of observations (B, size), and adds noise: for arms that rest, the last."""
         layout = self.layout
         for name in self._switched:
             where = layout.slices[name]
@@ -81,13 +86,13 @@ class Sensing:
             observation[:, where] = np.clip(values, -layout.high[where], layout.high[where])
         if not self._noisy:
             return
-        noise = self._population.values["sensor_noise"]
-        noisy = int(layout.slices["target_angle"].start)
-        for i in np.flatnonzero(noise > 0.0 if resting is None else (noise > 0.0) & ~resting):
-            noisy_observation = observation[i, :noisy] + float(noise[i]) * self._generators[int(i)].standard_normal(
-                noisy
-            )
-            observation[i, :noisy] = np.clip(noisy_observation, -layout.high[:noisy], layout.high[:noisy])
+        deviation = self._population.values["sensor_noise"]
+        noisy = self.noise.shape[1]
+        anew = np.ones(len(observation), dtype=np.bool_) if resting is None else ~resting
+        self.noise[anew] = 0.0
+        for i in np.flatnonzero(anew & (deviation > 0.0)):
+            self.noise[i] = float(deviation[i]) * self._generators[int(i)].standard_normal(noisy)
+        observation[:, :noisy] = np.clip(observation[:, :noisy] + self.noise, -layout.high[:noisy], layout.high[:noisy])
 
     def _quantity(self, name: str) -> Array:
         if name == "contact_force":

@@ -6,22 +6,27 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from elbow_gym.checks import non_negative, positive
-from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
+from elbow_gym.checks import LARGEST_INTEGER, non_negative, one_of, positive
+from elbow_gym.parameters import ARM_SUFFIX, ArmParameters, Array, as_arm, as_elbows
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulation.parameter_rows import quantities
-from elbow_gym.simulation.rates import rates, worst_rows
-from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep, schedule
+from elbow_gym.simulation.rates import Start, rates, worst_rows
+from elbow_gym.simulation.state_checks import check_angles
+from elbow_gym.simulation.step_limit import INTEGRATORS, check_option, check_timestep, schedule
 from elbow_gym.table import TableParameters, as_table
-from elbow_gym.task.circle import Circle, as_circle, check_reachable
+from elbow_gym.task.circle import Circle, as_circle, check_reachable, extreme_points
+from elbow_gym.task.default_circle import default_circle
 from elbow_gym.task.randomization import Randomization
+from elbow_gym.task.ranges import ends
 
 ACTION_UNITS = ("fraction", "volt")
 STARTS = ("paper", "on_target")
+# Rounding of a circle's height [m], and relative of its period.
+HAIR = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +36,7 @@ class Settings:
     elbows: int | tuple[int, ...] = 2
     """Elbows on the table: 0, 1, 2 as in the paper (joints (), (4,), (4, 7)), or joint numbers held at z = 0."""
     arm: str | ArmParameters | Mapping[str, Any] = "paper"
-    """Preset name, an ArmParameters, or its JSON dict."""
+    """Preset name, path of a JSON file, an ArmParameters, or its JSON dict; a file is read once, into a dict."""
     control_frequency: float = 50.0
     """Control periods per second [Hz]; an action is held for one."""
     timestep: float | None = None
@@ -52,7 +57,8 @@ class Settings:
     start_noise: float = 0.02
     """Standard deviation of the start pose [rad], projected onto the elbows' plane."""
     circle: Mapping[str, Any] | Circle | None = None
-    """Dict of `Circle` fields, the paper's where one is missing."""
+    """Dict of `Circle` fields, the paper's where one is missing; None: the paper's, or one in the reach of an arm that
+    cannot follow it with its last two links."""
     tracking_weight: float = 1.0
     """Cost per metre of tracking error [1/m]."""
     energy_weight: float = 0.001
@@ -75,30 +81,75 @@ class Settings:
     """Dict of ranges that `Randomization` draws from at each reset."""
 
     def __post_init__(self) -> None:
+        if isinstance(self.arm, str) and self.arm.endswith(ARM_SUFFIX):
+            # The file may change, and what is saved of these settings must not change with it.
+            object.__setattr__(self, "arm", as_arm(self.arm).to_dict())
         for name in ("control_frequency", "duration", "voltage_limit"):
             positive(name, getattr(self, name))
         for name in ("start_noise", "tracking_weight", "energy_weight"):
             non_negative(name, getattr(self, name))
         for name, allowed in (("action_unit", ACTION_UNITS), ("start", STARTS), ("integrator", INTEGRATORS)):
-            if getattr(self, name) not in allowed:
-                raise ValueError(f"{name} must be one of {allowed}, got {getattr(self, name)!r}")
-        if not math.isfinite(self.duration * self.control_frequency):
+            one_of(name, getattr(self, name), allowed)
+        if self.duration * self.control_frequency > LARGEST_INTEGER:
             raise ValueError(f"duration must be a countable number of control periods, got {self.duration}")
         if self.horizon < 1:
             raise ValueError(
                 f"duration must be at least one control period ({1 / self.control_frequency:g} s), got {self.duration}"
             )
         check_reachable(self._shortest_arm(), self.elbow_joints, self.parsed_circle)
+        self.check_followable(self.parsed_circle)
         _ = self.substeps
 
     @cached_property
     def parsed_arm(self) -> ArmParameters:
         """The arm that `arm` names."""
         arm = as_arm(self.arm)
+        check_angles("nominal_pose", np.array(arm.nominal_pose))
         if self.gear_coulomb_friction is None:
             return arm
         friction = non_negative("gear_coulomb_friction", self.gear_coulomb_friction)
         return replace(arm, motors=tuple(replace(motor, gear_coulomb_friction=friction) for motor in arm.motors))
+
+    def check_followable(self, circle: Circle) -> None:
+        """Raises ValueError where a target turns more than once in a control period, or goes below a compliant table.
+
+        Covers every circle that may be drawn.
+        """
+        shortest = ends(circle.period)[0]
+        if shortest < self.control_period * (1.0 - HAIR):
+            raise ValueError(
+                f"circle period must be at least one control period ({self.control_period:g} s), got {shortest:g}"
+            )
+        depth = -extreme_points(circle)[:, 2].min()
+        if self.conditions.surface is not None and depth > HAIR:
+            raise ValueError(f"circle must not go below the table, which pushes, got {depth:.4g} m below z = 0")
+
+    def given_circle(self, given: object) -> Circle:
+        """The circle of a reset's option, a dict of fields that replace the environment's, which None leaves.
+
+        Raises ValueError naming the field, or where the hand or the table forbids it.
+        """
+        if given is None:
+            return self.parsed_circle
+        if not isinstance(given, Mapping):
+            raise ValueError(f"options['circle'] must be a dict of circle fields, got {given!r}")
+        circle = Circle.from_dict({**self.parsed_circle.to_dict(), **cast("Mapping[str, Any]", given)})
+        check_reachable(self.parsed_arm, self.elbow_joints, circle)
+        self.check_followable(circle)
+        return circle
+
+    def check_steps(self, option: str, rows: Array, volts: Array, start: Start | None = None) -> None:
+        """Raises ValueError naming a reset's option unless the steps resolve arms put in some states.
+
+        Args:
+            option: its name.
+            rows: the arms' rows for the kernel, (k, PARAMETER_ROWS, n).
+            volts: their supply voltages [V], (k,).
+            start: what moves or is warm in their states; nothing when None.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = rates(rows, self.conditions, volts, elbows=bool(self.elbow_joints), start=start)
+        check_option(option, float(self.substeps.max()), found, self.integrator)
 
     def _shortest_arm(self) -> ArmParameters:
         shortest = self.randomization.lowest("length")
@@ -126,12 +177,31 @@ class Settings:
     @cached_property
     def parsed_circle(self) -> Circle:
         """The circle that `circle` describes."""
-        return as_circle(self.circle)
+        return default_circle(self.parsed_arm, self.elbow_joints) if self.circle is None else as_circle(self.circle)
 
     @cached_property
     def elbow_joints(self) -> tuple[int, ...]:
         """Joint numbers of the elbows, ascending."""
         return as_elbows(self.elbows, self.parsed_arm.n_joints)
+
+    @cached_property
+    def basis(self) -> dict[str, Any]:
+        """Values by name that a saved state rests on: with another one it would mean, or lead to, something else."""
+        conditions = self.conditions
+        return {
+            "elbows": self.elbow_joints,
+            "arm": self.parsed_arm,
+            "control_frequency": self.control_frequency,
+            "timestep": self.timestep,
+            "integrator": self.integrator,
+            "action_unit": self.action_unit,
+            "table": conditions.surface,
+            "voltage_limit": conditions.supply_voltage,
+            **{
+                name: getattr(conditions, name)
+                for name in ("elbow_friction", "heat", "supply_resistance", "regeneration", "payload")
+            },
+        }
 
     @property
     def control_period(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -10,10 +10,14 @@ from numpy.typing import NDArray
 
 from elbow_gym.checks import check_entries, require_entries
 from elbow_gym.kernel.rows import PARAMETERS
-from elbow_gym.kinematics import pitches
+from elbow_gym.kinematics import inverse_kinematics, pitches
 from elbow_gym.parameters import Array
 from elbow_gym.simulation.rates import Start
-from elbow_gym.simulator import PLANE_TOLERANCE, Simulator
+from elbow_gym.simulation.state_checks import PLANE_TOLERANCE
+from elbow_gym.simulator import Simulator
+from elbow_gym.task.arm_batch import Population
+from elbow_gym.task.circle import Circle
+from elbow_gym.task.settings import Settings
 
 STATE_ENTRIES = ("q", "q_dot", "current", "temperature_rise")
 # Raising links between rigid elbows and putting these back on the table comes closer each time [rounds].
@@ -55,6 +59,41 @@ def checked_state(simulator: Simulator, state: Mapping[str, Any], mask: NDArray[
                 f"{mass.shape[1] + 1} is the hand), got {depth[arm, point]:.6g} m"
             )
     return Start(q_dot[chosen], current[chosen], rise[chosen])
+
+
+def drawn_poses(
+    settings: Settings,
+    simulator: Simulator,
+    population: Population,
+    pose: Array,
+    generators: Sequence[np.random.Generator],
+    circles: Sequence[Circle],
+    chosen: NDArray[np.int64],
+) -> Array:
+    """Poses of all arms [rad], (B, n), those of the chosen ones (k,) as their episodes start.
+
+    Args:
+        settings: the environment's arguments.
+        simulator: simulator of the arms.
+        population: parameters of the arms.
+        pose: start pose of the nominal arm [rad], (n,).
+        generators: random generators of the chosen arms, which draw the noise.
+        circles: circles of the chosen arms.
+        chosen: numbers of arms, (k,).
+    """
+    noise, moved = settings.start_noise, "length" in settings.randomization.ranges
+    moved = moved or population.changed
+    q = np.tile(pose, (simulator.num_envs, 1))
+    if moved:
+        q = simulator.on_table(q)
+    if settings.start == "on_target":
+        arms = population.arms(chosen) if moved else [simulator.arm] * len(chosen)
+        for i, arm, circle in zip(chosen, arms, circles, strict=True):
+            q[i] = inverse_kinematics(arm, q[i], circle.position(float(circle.phase)))[0]
+    if noise > 0.0:
+        q[chosen] += noise * np.stack([generator.standard_normal(simulator.arm.n_joints) for generator in generators])
+        q = simulator.on_table(q)
+    return q if settings.conditions.surface is None else above_table(simulator, q)
 
 
 def above_table(simulator: Simulator, q: Array) -> Array:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym.checks import restore
+from elbow_gym.checks import as_dict, require_entries
+from elbow_gym.kernel.rows import AHEAD, PHASE, TURN
 from elbow_gym.parameters import Array
 from elbow_gym.task.circle import Circle, as_phase
 from elbow_gym.task.observation import LOOKAHEAD
@@ -19,27 +20,29 @@ class Targets:
 
     Args:
         circle: path, or ranges from which one is drawn for each arm at its reset.
-        num_envs: B, the number of arms.
+        task: the kernel's columns of what the arms are to do, (B, TASK_COLUMNS); these are kept up to date here:
+            the targets' angle at the reset, and how far they turn.
         control_period: time between two actions [s].
     """
 
-    def __init__(self, circle: Circle, num_envs: int, control_period: float) -> None:
+    def __init__(self, circle: Circle, task: Array, control_period: float) -> None:
+        num_envs = len(task)
         self._period = control_period
         first = circle.draw(np.random.default_rng(0))
         self.circles: list[Circle] = [first] * num_envs
         """Each arm's circle, as drawn at its last reset."""
-        self._path = np.repeat(first.path[None], num_envs, axis=0)
+        self.path = np.repeat(first.path[None], num_envs, axis=0)
+        """Each arm's path as Fourier rows [m], (B, rows, 3)."""
         self._rate = np.full(num_envs, first.rate)
-        self._phase = np.zeros(num_envs)
         self._radius, self._circle_period = np.empty(num_envs), np.empty(num_envs)
         self._measure(range(num_envs))
-        self._turn, self._lookahead = np.empty(num_envs), np.empty(num_envs)
+        self._task = task
         self._pace()
         self._alike = not circle.random
 
     def _pace(self) -> None:
         """Updates the targets' turns in a control period, and to the look-ahead target [rad], each (B,)."""
-        self._turn[:], self._lookahead[:] = self._rate * self._period, self._rate * LOOKAHEAD
+        self._task[:, TURN], self._task[:, AHEAD] = self._rate * self._period, self._rate * LOOKAHEAD
 
     def _measure(self, chosen: Iterable[int]) -> None:
         """Radii and periods of the chosen arms' circles, for infos."""
@@ -60,7 +63,7 @@ class Targets:
 
     def check(self, circles: Sequence[Circle]) -> None:
         """Raises ValueError unless the circles' paths have as many rows as those of the batch."""
-        rows = self._path.shape[1]
+        rows = self.path.shape[1]
         for circle in circles:
             if circle.path_rows != rows:
                 raise ValueError(f"circle must have a shape of {rows} path rows, got one of {circle.path_rows}")
@@ -70,20 +73,13 @@ class Targets:
         for i, circle in zip(chosen, circles, strict=True):
             self._alike = self._alike and bool((circle.path == self.circles[0].path).all())
             self.circles[int(i)] = circle
-            self._path[i], self._rate[i], self._phase[i] = circle.path, circle.rate, float(circle.phase)
+            self.path[i], self._rate[i], self._task[i, PHASE] = circle.path, circle.rate, float(circle.phase)
         self._measure(map(int, chosen))
         self._pace()
 
     def angle(self, steps: NDArray[np.int64]) -> Array:
         """Angle of each target on its path after `steps` control periods [rad], (B,)."""
-        return self._phase + self._turn * steps
-
-    def arguments(self, steps: NDArray[np.int64]) -> tuple[Array, Array, Array, NDArray[np.int64], Array]:
-        """The kernel's arguments: paths [m], phases, turns [rad], `steps` and look-aheads [rad], one row per arm.
-
-        The arrays are this object's own and are brought up to date in place.
-        """
-        return self._path, self._phase, self._turn, steps, self._lookahead
+        return self._task[:, PHASE] + self._task[:, TURN] * steps
 
     def position(self, angle: Array) -> Array:
         """Each target's position at its angle [m], (B, 3)."""
@@ -103,25 +99,30 @@ class Targets:
         return self._rate.copy()
 
     def get_state(self) -> dict[str, Any]:
-        """A copy of the paths, rates, phases and circles of all arms."""
-        own = {"path": self._path, "rate": self._rate, "phase": self._phase}
-        return {**{name: array.copy() for name, array in own.items()}, "circles": list(self.circles)}
+        """The circles of all arms, from which paths, rates and phases follow."""
+        return {"circles": list(self.circles)}
 
-    def set_state(self, state: Mapping[str, Any]) -> None:
-        """Restores a state of `get_state`. Raises ValueError on another number of arms or of path rows."""
-        own = {"path": self._path, "rate": self._rate, "phase": self._phase}
-        restore(own, state)
-        self._pace()
-        self.circles = list(state["circles"])
-        self._measure(range(len(self.circles)))
-        self._alike = bool((self._path == self._path[0]).all())
+    def checked(self, state: object, count: int) -> list[Circle]:
+        """The circles of `count` arms from a saved state. Raises ValueError where they are not drawn or do not fit."""
+        given = as_dict("state['targets']", state)
+        require_entries(given, ("circles",), "state['targets']")
+        circles = given["circles"]
+        if not isinstance(circles, list) or not all(
+            isinstance(one, Circle) and not one.drawn for one in cast("list[object]", circles)
+        ):
+            raise ValueError(f"state['targets']['circles'] must be a list of drawn circles, got {circles!r}")
+        drawn = cast("list[Circle]", circles)
+        if len(drawn) != count:
+            raise ValueError(f"state['targets']['circles'] must have {count} entries, got {len(drawn)}")
+        self.check(drawn)
+        return drawn
 
     def figures(self) -> dict[str, Array]:
         """Centre [m] (B, 3), radius [m], period [s], phase [rad] and signed rate [rad/s] of each circle, (B,)."""
         return {
-            "center": self._path[:, 0].copy(),
+            "center": self.path[:, 0].copy(),
             "radius": self._radius.copy(),
             "period": self._circle_period.copy(),
-            "phase": self._phase.copy(),
+            "phase": self._task[:, PHASE].copy(),
             "rate": self._rate.copy(),
         }

@@ -1,19 +1,23 @@
 """Commands of a program: the first word chooses one, errors end with a line, and each has its own help."""
 
+import errno
 import os
 import re
+import signal
 import subprocess
 import sys
+import tempfile
+import time
 from pathlib import Path
 from typing import Literal
 
 import pytest
 
-from agents.cli import Commands, Count, JsonObject, Seed
+from agents.cli import Commands, Count, JsonObject, Seed, spelled
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = {
-    "agents": ("reproduce", "train", "clone", "publish", "evaluate", "bound", "report", "watch"),
+    "agents": ("reproduce", "train", "clone", "publish", "evaluate", "bound", "verify", "export", "report", "watch"),
     "benchmarks": ("energy", "learning", "optimal", "speed"),
 }
 
@@ -123,6 +127,98 @@ def test_refusal_by_the_command_ends_with_one_line(app):
         app.run(["echo", "--word", "bad"])
 
 
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device", "runs/a"), "No space left on device: runs/a"),
+        (PermissionError(errno.EACCES, "Permission denied", "runs"), "Permission denied: runs"),
+        (FileNotFoundError(errno.ENOENT, "No such file or directory", b"runs"), "No such file or directory: runs"),
+        (ChildProcessError("a worker process was killed"), "a worker process was killed"),
+    ],
+)
+def test_error_of_the_system_ends_with_one_sentence(app, error, line):
+    @app.command
+    def fail() -> None:
+        """Fails as files do."""
+        raise error
+
+    with pytest.raises(SystemExit, match=f"^error: {line}$"):
+        app.run(["fail"])
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_signal_ends_with_the_shells_code_and_without_a_traceback(app, capsys, number, code):
+    cleaned = []
+
+    @app.command
+    def hang() -> None:
+        """Waits for a signal."""
+        try:
+            os.kill(os.getpid(), number)
+            time.sleep(60.0)
+        finally:
+            cleaned.append(number)
+
+    before = signal.getsignal(number)
+    with pytest.raises(SystemExit) as end:
+        app.run(["hang"])
+    assert (end.value.code, cleaned) == (code, [number])
+    assert capsys.readouterr().err == ""
+    assert signal.getsignal(number) is before
+
+
+def test_what_is_said_to_a_terminal_that_is_gone_is_dropped():
+    code = (
+        "import os, signal; from agents.cli import forget_lost_terminal;"
+        "signal.signal(signal.SIGHUP, signal.SIG_IGN);"
+        "open('ready', 'w').close(); input();"
+        "forget_lost_terminal(); print('lost', flush=True); open('done', 'w').close()"
+    )
+    pty = pytest.importorskip("pty")
+    with tempfile.TemporaryDirectory() as folder:
+        terminal, side = pty.openpty()
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        pipes = {"stdin": subprocess.PIPE, "stdout": side, "stderr": side, "cwd": folder, "env": environment}
+        process = subprocess.Popen([sys.executable, "-c", code], **pipes)
+        os.close(side)
+        while not (Path(folder) / "ready").exists():
+            time.sleep(0.01)
+        os.close(terminal)
+        process.communicate(b"go\n")
+        assert process.returncode == 0
+        assert (Path(folder) / "done").exists()
+
+
+def test_signal_that_a_parent_has_set_to_be_ignored_stays_ignored(app):
+    @app.command
+    def go_on() -> None:
+        """Is not ended by the terminal's end, as under nohup."""
+        os.kill(os.getpid(), signal.SIGHUP)
+
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        app.run(["go_on"])
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.parametrize(
+    ("word", "shown"),
+    [
+        ("/home/ada/thesis/first", "first"),
+        ("--output=/home/ada/runs", "--output=runs"),
+        ("~/runs", "runs"),
+        ("../ada/runs", "runs"),
+        (r"C:\Users\ada\runs", "runs"),
+        ("runs/first", "runs/first"),
+        ("0.002", "0.002"),
+    ],
+)
+def test_command_lines_for_cards_hold_no_folders_of_a_user(word, shown):
+    assert spelled("agents", "train", ["ppo", word]) == f"python -m agents train ppo {shown}"
+
+
 def test_line_is_plain_on_a_coloured_terminal():
     pty = pytest.importorskip("pty")
     terminal, stdout = pty.openpty()
@@ -208,7 +304,7 @@ def groups(said):
 
 def test_help_of_an_algorithm_groups_its_options_apart_and_shows_the_defaults_that_apply():
     found = groups(said := said_by("-m", "agents", "train", "ppo", "--help"))
-    assert found["task options"] == {"--env", "--elbows", "--environment"}
+    assert found["task options"] == {"--env", "--elbows", "--arm", "--environment"}
     assert {"--seeds", "--output", "--label"} <= found["run options"]
     assert {"--total-timesteps", "--gamma", "--clip-range"} <= found["algorithm options"]
     assert "--tau" not in said

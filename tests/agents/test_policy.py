@@ -1,8 +1,12 @@
 """Policies: files that never unpickle, an actor equal to SB3's, and refusals that say why."""
 
+import hashlib
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 import torch
@@ -17,7 +21,7 @@ from agents.learning.sac.settings import SACSettings
 from agents.shipped import seeds as shipped
 from agents.shipped.seeds import load_policy
 from elbow_gym.baselines import policy as baselines
-from elbow_gym.baselines.policy import Policy
+from elbow_gym.baselines.policy import Policy, read_policy
 from elbow_gym.env import ElbowArmEnv
 from elbow_gym.sb3 import SB3VecEnv
 from elbow_gym.task.settings import Settings
@@ -34,6 +38,11 @@ def model():
 @pytest.fixture
 def policy(model):
     return policy_of(model, Settings(), command="test")
+
+
+def changed(policy, **entries):
+    """The card with other entries, and the digest still to be found."""
+    return replace(policy.card, digest="", **entries)
 
 
 def test_policy_acts_as_the_model_that_it_came_from(model, policy):
@@ -102,7 +111,7 @@ def test_policy_of_a_model_behind_other_wrappers_is_refused_by_name(wrapped, nam
     ("activation", "output"), [("tanh", "clip"), ("relu", "tanh"), ("elu", "clip"), ("silu", "clip")]
 )
 def test_torch_form_acts_as_the_numpy_one(policy, activation, output):
-    other = Policy(replace(policy.card, activation=activation, output=output), policy.weights)
+    other = Policy(changed(policy, activation=activation, output=output), policy.weights)
     observation = np.random.default_rng(1).normal(size=(9, policy.card.layers[0]), scale=30.0).astype(np.float32)
     with torch.no_grad():
         expected = other.module()(torch.from_numpy(observation)).numpy()
@@ -131,8 +140,146 @@ def test_squashed_actor_acts_as_the_model_that_it_came_from(use_sde, tmp_path):
 
 def test_weights_of_another_card_are_refused(policy):
     other = {name: weights + 1.0 for name, weights in policy.weights.items()}
-    with pytest.raises(ValueError, match="weights must be those of the card, with the digest"):
+    with pytest.raises(ValueError, match="weights and card must be those of the digest"):
         Policy(policy.card, other)
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        {"activation": "elu"},
+        {"output": "tanh"},
+        {"env": "ElbowArmTable-v0"},
+        {"environment": {"voltage_limit": 12.0}},
+        {"environment": {"action_unit": "volt"}},
+        {"observation_version": 0},
+        {"observation": ("other [-]",)},
+    ],
+    ids=lambda entry: next(iter(entry)),
+)
+def test_card_that_was_altered_where_it_decides_what_the_policy_does_is_refused(policy, entry, tmp_path):
+    save_policy(policy, tmp_path / "p")
+    plain = json.loads((tmp_path / "p.json").read_text())
+    (tmp_path / "p.json").write_text(json.dumps(plain | entry))
+    with pytest.raises(ValueError, match="weights and card must be those of the digest"):
+        load_policy(tmp_path / "p")
+
+
+def test_account_of_how_the_policy_came_about_may_change(policy, tmp_path):
+    save_policy(policy, tmp_path / "p")
+    plain = json.loads((tmp_path / "p.json").read_text())
+    (tmp_path / "p.json").write_text(json.dumps(plain | {"command": "another", "training": {"seed": 7}}))
+    assert load_policy(tmp_path / "p").card.digest == policy.card.digest
+
+
+def test_weights_that_are_not_contiguous_or_of_double_precision_are_saved_as_float32_in_c_order(policy, tmp_path):
+    turned = {name: np.asfortranarray(weights).astype(np.float64) for name, weights in policy.weights.items()}
+    assert not turned["weight_0"].flags.c_contiguous
+    save_policy(Policy(policy.card, turned), tmp_path / "p")
+    back = load_policy(tmp_path / "p")
+    for name, weights in policy.weights.items():
+        np.testing.assert_array_equal(back.weights[name], weights)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_weights_that_are_not_finite_are_refused(policy, value):
+    weights = {name: array.copy() for name, array in policy.weights.items()}
+    weights["bias_1"][2] = value
+    with pytest.raises(ValueError, match=f"bias_1 must be finite, got {value}"):
+        Policy(changed(policy), weights)
+
+
+@pytest.mark.parametrize("end", ["json", "safetensors"])
+def test_files_that_were_cut_or_flipped_anywhere_are_refused_by_name(policy, tmp_path, end):
+    save_policy(policy, tmp_path / "p")
+    path, rng, refusals = tmp_path / f"p.{end}", np.random.default_rng(0), []
+    whole = path.read_bytes()
+    account = whole.find(b'"training"') if end == "json" else len(whole)
+    for place in [0, 1, 8, *rng.integers(account, size=60)]:
+        path.write_bytes(whole[:place])
+        with pytest.raises(ValueError, match=r"^policy (card|weights) must"):
+            load_policy(tmp_path / "p")
+        flipped = bytearray(whole)
+        flipped[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(flipped)
+        try:
+            digest = load_policy(tmp_path / "p").card.digest
+        except ValueError as refusal:
+            refusals.append(str(refusal))
+        else:
+            # A flip inside the account, such as the algorithm's name, decides nothing.
+            assert digest == policy.card.digest
+    assert all(re.search(r"must .*got", refusal, re.DOTALL) for refusal in refusals)
+    assert len(refusals) > 40
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ({"activation": ["silu"]}, "activation of a policy card must be a text"),
+        ({"layers": ["8", 8]}, "layers of a policy card must be at least two positive integers"),
+        ({"layers": [8]}, "layers of a policy card must be at least two positive integers"),
+        ({"observation": [1]}, "observation of a policy card must be names"),
+        ({"environment": []}, "environment of a policy card must be an object"),
+        ({"environment": {"wind": 1}}, "environment of the policy must be arguments of one"),
+        ({"format": 1}, "format of the policy must be 2, got 1"),
+        ({"wind": 1}, "unknown entry 'wind'"),
+    ],
+)
+def test_entries_of_another_type_are_refused_by_name(policy, tmp_path, entry, message):
+    save_policy(policy, tmp_path / "p")
+    plain = json.loads((tmp_path / "p.json").read_text())
+    (tmp_path / "p.json").write_text(json.dumps(plain | entry))
+    with pytest.raises(ValueError, match=message):
+        load_policy(tmp_path / "p")
+
+
+@pytest.mark.parametrize(
+    ("observation", "message"),
+    [
+        (np.nan, "observation must be finite, got nan"),
+        (-np.inf, "observation must be finite, got -inf"),
+        (3e38, "observation must not overflow float32"),
+    ],
+)
+def test_observations_that_are_not_finite_or_overflow_raise(policy, observation, message):
+    weights = {name: 9.0 * np.sign(array + 0.01) for name, array in policy.weights.items()}
+    weights["weight_0"][:, ::2] *= -1.0
+    large = Policy(changed(policy, activation="relu"), weights)
+    with pytest.raises(ValueError, match=message):
+        large.predict(np.full((2, policy.card.layers[0]), observation, np.float32))
+    with pytest.raises(ValueError, match="observation must have 41 entries, got a scalar"):
+        policy.predict(np.float32(0.0))
+
+
+def test_policy_is_checked_under_wrappers_adapters_and_vector_environments(policy):
+    def batch(**arguments):
+        return ElbowArmVectorEnv(2, **arguments, autoreset_mode="SameStep")
+
+    makers = [
+        lambda **arguments: SB3VecEnv(batch(**arguments)),
+        lambda **arguments: VecMonitor(SB3VecEnv(batch(**arguments))),
+        lambda **arguments: gym.make("ElbowArm-v0", **arguments),
+        lambda **arguments: gym.make_vec("ElbowArm-v0", 2, vectorization_mode="sync", **arguments),
+        lambda **arguments: DummyVecEnv([lambda: ElbowArmEnv(**arguments)]),
+        batch,
+    ]
+    for make in makers:
+        assert policy.acting_in(make()) is policy
+        with pytest.raises(ValueError, match=r"elbow_joints of the environment must be \(4, 7\) as in training, got"):
+            policy.check(make(elbows=1))
+    with pytest.raises(ValueError, match="env must hold an environment of elbow_gym in this process, got 3"):
+        policy.check(3)
+
+
+def test_shipped_weights_are_those_that_were_trained():
+    trained = json.loads((Path(__file__).parents[1] / "vectors" / "policy_weights.json").read_text())
+    for name, digest in trained.items():
+        group, _, seed = name.rpartition("_seed")
+        found = hashlib.sha256()
+        for entry, weights in sorted(read_policy(shipped.shipped_path(group, int(seed))).weights.items()):
+            found.update(entry.encode() + weights.tobytes())
+        assert found.hexdigest() == digest, name
 
 
 def test_saved_policy_comes_back_bit_for_bit(policy, tmp_path):
@@ -147,7 +294,7 @@ def test_saved_policy_comes_back_bit_for_bit(policy, tmp_path):
 def test_interrupted_save_leaves_the_old_policy(policy, tmp_path, monkeypatch):
     save_policy(policy, tmp_path / "p")
     before = (tmp_path / "p.safetensors").read_bytes()
-    monkeypatch.setattr("safetensors.numpy.save_file", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
+    monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
     with pytest.raises(OSError, match="disk full"):
         save_policy(policy, tmp_path / "p")
     assert (tmp_path / "p.safetensors").read_bytes() == before
@@ -171,8 +318,8 @@ def test_policy_refuses_another_environment(policy, env, message):
 
 def test_policy_refuses_another_observation(policy):
     for card, message in (
-        (replace(policy.card, observation_version=0), "observation_version of the policy must be"),
-        (replace(policy.card, observation=policy.card.observation[::-1]), "observation of the policy must be"),
+        (changed(policy, observation_version=0), "observation_version of the policy must be"),
+        (changed(policy, observation=policy.card.observation[::-1]), "observation of the policy must be"),
     ):
         with pytest.raises(ValueError, match=message):
             Policy(card, policy.weights).check(ElbowArmEnv())
@@ -184,9 +331,11 @@ def test_bundle_that_does_not_fit_is_refused(policy, tmp_path):
     with pytest.raises(ValueError, match=r"weight_0 must have shape \(8, \d+\), got nothing"):
         Policy(policy.card, {})
     with pytest.raises(ValueError, match="activation must be one of"):
-        Policy(replace(policy.card, activation="sine"), policy.weights)
-    with pytest.raises(ValueError, match="format of the policy must be 1, got 7"):
-        Policy(replace(policy.card, format=7), policy.weights)
+        Policy(changed(policy, activation="sine"), policy.weights)
+    with pytest.raises(ValueError, match="format of the policy must be 2, got 7"):
+        replace(policy.card, format=7)
+    with pytest.raises(ValueError, match=r"weights must be those of 3 layers, got 'weight_9', too"):
+        Policy(policy.card, {**policy.weights, "weight_9": policy.weights["weight_0"]})
     needed = (
         r"^elbows or env must be given for the baselines 'ppo', such as elbows=0 or elbows=1 or elbows=2, got neither$"
     )

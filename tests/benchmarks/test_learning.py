@@ -47,6 +47,8 @@ def test_figure_and_table_come_from_the_files(tmp_path):
     for seed, energy in ((0, 600.0), (1, 900.0)):
         row = dict.fromkeys(COLUMNS, 1.0) | {"electrical_energy": energy, "return": -30.0 - seed}
         rows = [[row[name] if name != "steps" else steps for name in COLUMNS] for steps in (0.0, 100.0)]
+        (results / "run").mkdir(exist_ok=True)
+        (results / "run/run.json").write_text("{}")
         RunFolder(results / "run").write_evaluations(rows)
         (results / "curves").mkdir(exist_ok=True)
         (results / "run/evaluations.csv").rename(results / f"curves/ppo_elbows2_seed{seed}.csv")

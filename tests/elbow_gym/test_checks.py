@@ -3,22 +3,30 @@
 import numpy as np
 import pytest
 
-from elbow_gym.checks import as_batch, as_numbers, positive_integer, require_entries, restore
+from elbow_gym.checks import as_batch, as_numbers, positive_integer, require_entries, saved_rows
 
 
-def test_restore_copies_into_the_same_arrays():
-    q, steps = np.zeros((2, 3)), np.zeros(2, dtype=np.int64)
-    restore({"q": q, "steps": steps}, {"q": np.ones((2, 3)), "steps": np.array([4, 5]), "more": None})
-    np.testing.assert_array_equal(q, np.ones((2, 3)))
-    np.testing.assert_array_equal(steps, [4, 5])
+@pytest.mark.parametrize(
+    ("saved", "like", "message"),
+    [
+        ([[1.0, 2.0]], np.zeros((4, 3)), r"^state must have shape \(2, 3\), got \(1, 2\)$"),
+        ([[1.0], [2.0, 3.0]], np.zeros((4, 3)), r"^state must have shape \(2, 3\), got \[\[1.0\], "),
+        ([1.0, np.inf], np.zeros(4), "^state must be finite, got inf$"),
+        ([1.0, 2.0], np.zeros(4, dtype=np.int64), "^state must have entries as int64, got float64$"),
+        ([1, 0], np.zeros(4, dtype=np.bool_), "^state must have entries as bool, got int64$"),
+    ],
+)
+def test_saved_rows_that_do_not_fit_are_refused(saved, like, message):
+    with pytest.raises(ValueError, match=message):
+        saved_rows("state", saved, like, 2)
 
 
-@pytest.mark.parametrize(("saved", "got"), [({}, "nothing"), ({"steps": np.zeros(3)}, r"\(3,\)")])
-def test_restore_changes_nothing_unless_everything_fits(saved, got):
-    q, steps = np.zeros((2, 3)), np.zeros(2)
-    with pytest.raises(ValueError, match=rf"^state\['steps'\] must have shape \(2,\), got {got}$"):
-        restore({"q": q, "steps": steps}, {"q": np.ones((2, 3)), **saved})
-    np.testing.assert_array_equal(q, np.zeros((2, 3)))
+def test_saved_rows_are_a_copy_of_the_right_type():
+    saved = np.array([4, 5], dtype=np.int32)
+    rows = saved_rows("state", saved, np.zeros(7), 2)
+    assert (rows.dtype, rows.tolist()) == (np.float64, [4.0, 5.0])
+    same = saved_rows("state", rows, np.zeros(7), 2)
+    assert not np.shares_memory(same, rows)
 
 
 def test_one_row_stands_for_every_arm():
@@ -44,7 +52,7 @@ def test_numbers_are_contiguous_doubles():
     assert array.flags.c_contiguous
 
 
-@pytest.mark.parametrize("value", [0, -1, 1.0, True, "1", None])
+@pytest.mark.parametrize("value", [0, -1, 1.0, True, "1", None, 2**31 + 1, pytest.param(10**5000, id="huge")])
 def test_count_must_be_a_positive_integer(value):
     with pytest.raises(ValueError, match=r"^num_envs must be a positive integer, got "):
         positive_integer("num_envs", value)

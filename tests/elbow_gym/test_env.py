@@ -18,7 +18,8 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env, data_equivalence
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
-from elbow_gym import ElbowArmEnv, paper_arm
+from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, paper_arm
+from tests.support.arms import blow_up
 
 ID = "elbow_gym:ElbowArm-v0"
 POSE = np.array(paper_arm().nominal_pose)
@@ -190,9 +191,7 @@ def test_truncated_after_the_duration_and_never_before(duration, frequency):
 def test_leaving_float64_terminates_and_costs_the_worst_rate_for_all_the_remaining_time(lived):
     env = started(steps=0)
     run(env, np.zeros((lived, 10)))
-    state = env.get_state()
-    state["episodes"]["simulator"]["state"][0, 1] = 1e200
-    env.set_state(state)
+    blow_up(env)
     observation, reward, terminated, truncated, info = env.step(ACTIONS[0])
     assert (terminated, truncated) == (True, False)
     assert observation in env.observation_space
@@ -278,3 +277,83 @@ def test_gymnasiums_checker_passes_without_pygame():
 def test_unknown_render_mode_is_a_value_error():
     with pytest.raises(ValueError, match=r"^render_mode must be .*, got 'hologram'$"):
         ElbowArmEnv(render_mode="hologram")
+
+
+HUGE = 10**400
+RANDOM_ARM = {"randomize": {"mass": [0.8, 1.2], "length": [0.95, 1.05]}, "circle": {"radius": [0.05, 0.1]}}
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["phase"], r"options must be a dict, got \['phase'\]"),
+        (3, "options must be a dict, got 3"),
+        ({1: 2, "pose": 3}, r"options must have only the entries .*, got 1"),
+        ({"phase": "random"}, "phase must be an angle in rad, got 'random'"),
+        ({"phase": HUGE}, "phase must be finite, got an integer of more than twenty digits"),
+        ({"phase": np.array(1.0)}, r"phase must be an angle in rad, got array\(1\.\)"),
+        ({"state": {"q": [HUGE] * 10}}, "q must be numbers of shape "),
+        ({"parameters": {"payload": HUGE}}, r"options\['parameters'\]\['payload'\] must be "),
+        ({"circle": {"radius": np.array(0.1)}}, r"circle radius must be a number, got array\(0.1\)"),
+        ({"circle": {"center": np.array(0.1)}}, "circle center must have three coordinates, got 0.1"),
+        ({"circle": {"center": [HUGE, 1.0, 0.5]}}, "circle center must be finite, got "),
+        ({"circle": {"shape": np.array(2.0)}}, "circle shape must be one of .* or a list of points, got 2.0"),
+        ({"circle": {"shape": [[0.0, 0.0, HUGE]] * 3}}, "circle shape must have points of three finite numbers, got "),
+        ({"circle": {"direction": ["up"]}}, r"circle direction must be one of .*, got \['up'\]"),
+        ({"circle": {"period": 1e-300}}, r"circle period must be at least one control period \(0.02 s\), got 1e-300"),
+    ],
+)
+@pytest.mark.parametrize("seed", [None, 9])
+def test_a_refused_reset_has_drawn_nothing(options, message, seed):
+    env, twin = started(**RANDOM_ARM), started(**RANDOM_ARM)
+    with pytest.raises(ValueError, match=f"^{message}"):
+        env.reset(seed=seed, options=options)
+    assert same(env.get_state(), twin.get_state())
+    assert same(future(env), future(twin))
+
+
+def test_an_interrupted_reset_has_drawn_nothing(monkeypatch):
+    env, twin = started(**RANDOM_ARM), started(**RANDOM_ARM)
+
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(env.episodes.simulator, "on_table", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        env.reset(seed=9)
+    monkeypatch.undo()
+    assert same(future(env), future(twin))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"circle": {"period": 1e-300}}, r"circle period must be at least one control period \(0.02 s\), got 1e-300"),
+        (
+            {"circle": {"period": [0.01, 2.0]}},
+            r"circle period must be at least one control period \(0.02 s\), got 0.01",
+        ),
+        (
+            {"circle": {"center": [1.5, 1.5, 0.05], "plane": "xz"}, "table": True, "elbows": 0},
+            "circle must not go below the table, which pushes, got 0.05 m below z = 0",
+        ),
+        (
+            {"circle": {"center": [1.5, 1.5, [-0.1, 0.4]]}, "table": True},
+            "circle must not go below the table, which pushes, got 0.1 m below z = 0",
+        ),
+        (
+            {"arm": paper_arm().to_dict() | {"nominal_pose": [1e308] * 10}},
+            "nominal_pose must be within 100000 rad, got ",
+        ),
+        ({"duration": 1e9}, "duration must be a countable number of control periods, got 1000000000.0"),
+        ({"duration": HUGE}, "duration must be finite, got an integer of more than twenty digits"),
+        ({"action_unit": ["volt"]}, r"action_unit must be one of .*, got \['volt'\]"),
+        ({"start": np.array(["paper", "paper"])}, "start must be one of "),
+        ({"elbows": np.array(2.0)}, "elbows must be 0, 1, 2 or a tuple of joint numbers, got "),
+    ],
+)
+def test_wrong_arguments_are_refused_by_name(arguments, message):
+    with pytest.raises(ValueError, match=f"^{message}"):
+        ElbowArmEnv(**arguments)
+    with pytest.raises(ValueError, match=f"^{message}"):
+        ElbowArmVectorEnv(2, **arguments)

@@ -8,6 +8,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from elbow_gym.multi_objective import MOElbowArmEnv, MOElbowArmVectorEnv
+from tests.support.arms import blow_up
 
 WEIGHTS = np.array([1.0, 0.001])
 # 1 - (1 + 2^-30) (1 - 2^-30) is 2^-60 if the product is not rounded, and 0 if it is.
@@ -75,9 +76,9 @@ def test_reward_space_is_finite_and_holds_the_worst_that_can_be_charged_and_brak
         assert reward in space
         highest = max(highest, reward[1])
     state = env.get_state()
-    state["episodes"]["simulator"]["state"][0, 1] = 1e200
     state["episodes"]["steps"][:] = 0
     env.set_state(state)
+    blow_up(env)
     _, reward, terminated, *_ = env.step(np.zeros(10, np.float32))
     assert terminated
     np.testing.assert_allclose(reward, space.low, rtol=1e-12)

@@ -158,7 +158,7 @@ def test_a_missing_entry_is_named(arm):
 
 def test_an_arm_is_a_preset_a_dict_or_itself(arm):
     assert as_arm("paper") == as_arm(arm.to_dict()) == as_arm(arm) == paper_arm()
-    with pytest.raises(ValueError, match=r"^arm must be one of \['paper'\], got 'puma'$"):
+    with pytest.raises(ValueError, match=r"^arm must be one of \['paper'\] or a .json file, got 'puma'$"):
         as_arm("puma")
     with pytest.raises(ValueError, match=r"^arm must be a preset name, a dict or ArmParameters, got 7$"):
         as_arm(7)

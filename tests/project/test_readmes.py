@@ -65,7 +65,7 @@ def test_snippet_of_a_room_runs(page, snippet, tmp_path, monkeypatch):
 
 
 def test_every_room_has_a_snippet_where_it_has_an_interface():
-    assert [PAGES[page].count("```python\n") for page in PAGES] == [1, 13, 2, 0]
+    assert [PAGES[page].count("```python\n") for page in PAGES] == [1, 14, 2, 0]
 
 
 def test_readme_is_short_and_has_the_two_commands():

@@ -76,3 +76,19 @@ def mechanical_energy(sim):
 def inductor_energy(sim):
     """Energy of each armature's inductance [J], (n,)."""
     return sim.arm.of_motors("armature_inductance") * sim.current[0] ** 2 / 2.0
+
+
+def six_joint_arm():
+    """Six joints and longer links than the paper's, whose circle it cannot follow; joint 4 can lie on the table."""
+    quarter = np.pi / 4.0
+    return ArmParameters(
+        links=(LinkParameters(length=0.0), *(LinkParameters(mass=0.2, length=0.4) for _ in range(5))),
+        motors=(MotorParameters(gear_ratio=5.0),) * 6,
+        joint_viscous_friction=(0.5,) * 6,
+        nominal_pose=(0.0, quarter, 2.0 * quarter, -2.0 * quarter, quarter, quarter),
+    )
+
+
+def blow_up(env, i=0):
+    """Makes arm i of an environment so fast that its next control step leaves what float64 can represent."""
+    env.episodes.simulator.raw[0][i, 1] = 1e200

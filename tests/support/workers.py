@@ -15,6 +15,9 @@ class PoolHere(Executor):
     def __init__(self, *_, **__):
         pass
 
+    def stop(self):
+        """Nothing is going on."""
+
     def submit(self, function, /, *arguments):
         function, arguments = pickle.loads(pickle.dumps((function, arguments)))
         future = Future()

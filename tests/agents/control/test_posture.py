@@ -3,8 +3,10 @@
 import numpy as np
 
 from agents.control.inverse_dynamics import InverseDynamics
-from agents.control.posture import LARGEST, slopes
-from elbow_gym.kinematics import pitches
+from agents.control.posture import LARGEST, leads_to, slopes
+from elbow_gym.kinematics import elbow_heights, inverse_kinematics, on_table, pitches
+from elbow_gym.task.default_circle import default_circle
+from tests.support.arms import six_joint_arm
 
 
 def test_slopes_are_the_derivatives_of_many_values_and_of_one():
@@ -41,3 +43,13 @@ def test_holding_a_pose_is_driving_without_motion(arm):
     q, rest = np.random.default_rng(1).normal(size=(5, 10)), np.zeros((5, 10))
     for held, driven in zip(inverse.hold(q), inverse.drive(q, rest, rest), strict=True):
         np.testing.assert_allclose(held, driven, rtol=1e-12, atol=1e-12)
+
+
+def test_posture_on_the_other_side_of_an_elbow_is_not_moved_to():
+    arm = six_joint_arm()
+    start = on_table(arm, arm.nominal_pose, (4,))
+    assert leads_to(arm, (4,), inverse_kinematics(arm, start, default_circle(arm, (4,)).position(0.0))[0])
+    # Links 2 and 3 fold over their own axis: up to joint 4 and down again on the other side.
+    folded = start * np.array([1.0, -1.0, -1.0, 1.0, 1.0, 1.0]) + np.array([0.0, 0.0, 2.0 * np.pi, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(elbow_heights(arm, folded, (4,)), 0.0, atol=1e-9)
+    assert not leads_to(arm, (4,), folded)

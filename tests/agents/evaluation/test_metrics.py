@@ -48,6 +48,8 @@ def test_metrics_of_a_hand_made_run():
         "peak_voltage": 12.0,
         "smallest_elbow_force": -1.0,
         "below_table": 0.1,
+        # Two changes of 12 V among four of each of two joints.
+        "voltage_change": 6.0,
         "return": -(5 * 0.005 + 5 * 0.001 * 1.0),
     }
     for name, value in expected.items():

@@ -7,7 +7,7 @@ from agents.evaluation import players
 from agents.evaluation.players import CLASSICAL, ELBOW_COUNTS, Entry, entries, find_player, player_of
 from agents.evaluation.regimes import in_all_regimes
 from agents.shipped.seeds import load_policy
-from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES
+from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES, SPARE_COLOURS
 from elbow_gym.baselines.pd import PDController
 from elbow_gym.baselines.policy import BASELINES
 from elbow_gym.table import TableParameters
@@ -65,7 +65,7 @@ def test_policy_is_found_by_its_path_and_brings_its_environment():
     [
         (
             ("nobody", 2),
-            r"player must be one of .*'lqr', 'pd'.*'ppo'.* in elbows2, or a policy's path, got 'nobody'",
+            r"player must be one of .*'pd'.*'lqr'.*'ppo'.* in elbows2, or the folder of .*:callable, got 'nobody'",
         ),
         (("lqr", 5), "elbows of the LQR must be a count with an optimal trajectory, got 5: no elbows5.npz"),
         (("pd", 9), "elbows must be .*, got 9"),
@@ -93,7 +93,8 @@ class Idle:
 def test_any_maker_of_a_controller_makes_a_player():
     settings = Settings(elbows=0, duration=2.1)
     player = player_of("idle", settings, lambda _: Idle())
-    assert (player.label, player.colour, player.marker, player.task) == ("idle", "#000000", "o", "elbows0")
+    assert (player.label, player.marker, player.task) == ("idle", "o", "elbows0")
+    assert player.colour in SPARE_COLOURS
     results = in_all_regimes(player, [1, 2])
     # No voltage and what moves the joints turns the motors into brakes: nothing is drawn from the supply.
     np.testing.assert_allclose(results["A"]["drawn_energy"], 0.0)

@@ -1,10 +1,12 @@
 """Episodes from several starts side by side are those of each start alone, bit for bit."""
 
+import re
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
+from agents.__main__ import app
 from agents.evaluation.metrics import REGIMES, metrics
 from agents.evaluation.players import TABLE_ENV, find_player
 from agents.evaluation.recording import Recording, record, record_starts
@@ -63,3 +65,15 @@ def test_regimes_are_counted_from_the_episodes_of_their_start():
         alone = record(replace(player.settings, start=regime.start), player.make, SEEDS)
         np.testing.assert_array_equal(results[regime.name]["return"], metrics(alone, regime.since)["return"])
     assert list(in_all_regimes(player, SEEDS, regimes=REGIMES[:1])) == ["A"]
+
+
+def test_bar_of_the_command_ends_at_100_percent_and_shows_no_other(monkeypatch, capsys):
+    def play(player, seeds, progress):
+        for done in (0, 125, 250, 500):
+            progress(done, 500)
+
+    monkeypatch.setattr("agents.evaluation.regimes.in_all_regimes", play)
+    monkeypatch.setattr("agents.evaluation.regimes.print_results", lambda *_: None)
+    app.run(["evaluate", "pd", "--episodes", "1"])
+    percents = [int(percent) for percent in re.findall(r"(\d+)%", capsys.readouterr().err)]
+    assert percents[-1] == max(percents) == 100

@@ -131,6 +131,9 @@ def test_commands_in_clones_cards_clone_with_the_settings_of_the_card(monkeypatc
         ("train ppo --first-seed -1", "--first-seed must be an integer of at least 0, got -1"),
         ("train ppo --workers 0", "--workers must be a positive integer, got 0"),
         ("train ppo --env Foo-v0", "'Foo-v0' for argument '--env'. Expected one of .*ElbowArmTable-v0"),
+        ("evaluate pd --env Foo-v0", "'Foo-v0' for argument '--env'. Expected one of .*ElbowArmTable-v0"),
+        ("watch pd --env Foo-v0", "'Foo-v0' for argument '--env'. Expected one of .*ElbowArmTable-v0"),
+        ("train ppo --elbows two", "--elbows must be a number of elbows, or joint numbers .*, got two"),
         (
             "train ppo --environment '{'",
             "--environment must be a JSON object such as '{\"duration\": 10}', got {, which is no JSON from",
@@ -162,12 +165,15 @@ def test_parser_refuses_a_wrong_value_in_one_line_that_names_it(runs, capsys, li
         ("""train ppo --environment '{"elbows": 1}'""", "--environment must hold only .* got elbows .*--elbows"),
         ("""train ppo --environment '{"wind": 1}'""", "--environment must hold only action_unit, .* got wind"),
         ("""train ppo --environment '{"duration": -1}'""", "duration must be positive, got -1"),
-        ("train ppo --elbows 9", "elbows must be 0, 1, 2 or a tuple of joint numbers, got 9"),
+        (
+            "train ppo --elbows 11",
+            r"elbows must be joints 3 to 10 \(joints 1 and 2 sit on the base\), got 11 in \(11,\)",
+        ),
+        ("evaluate pd --arm nowhere.json", "arm must be a JSON file of an arm, got nowhere.json: .*No such file"),
         ("train ppo --minutes 0", "minutes must be positive, got 0.0"),
         ("train ppo --checkpoint-seconds -1", "checkpoint_seconds must be finite and not negative, got -1.0"),
         ("train ppo --initial-policy nowhere", "--initial-policy must be the path of a policy's files, got nowhere"),
-        ("evaluate pd --env Foo-v0", r"env must be one of \['ElbowArm-v0', .*, got 'Foo-v0'"),
-        ("watch pd --env Foo-v0", r"env must be one of \['ElbowArm-v0', .*, got 'Foo-v0'"),
+        ("evaluate", "WHAT must be at least one of pd_paper, .*ppo.*, or the folder of a run, .*module:callable"),
         ("publish", "runs must be at least one folder of a finished training, got none"),
     ],
 )

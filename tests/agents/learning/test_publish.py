@@ -53,6 +53,44 @@ def test_unfinished_misnamed_and_large_runs_are_refused(run, tmp_path, monkeypat
     assert not (tmp_path / "policies").exists()
 
 
+def test_worse_policy_takes_no_better_ones_place_unless_allowed(run, tmp_path):
+    shipped = places(tmp_path)
+    publish([run], **shipped)
+    card = json.loads((run / "best.json").read_text())
+    better = card["evaluation"]["return"]
+    card["evaluation"]["return"] = better - 1.0
+    (run / "best.json").write_text(json.dumps(card))
+    for more in ({}, {"replace_seeds": True}):
+        message = (
+            rf"return must be at least the shipped ppo_elbows2_seed0's {better:.2f}, or --allow-worse be given, got"
+        )
+        with pytest.raises(ValueError, match=message):
+            publish([run], **shipped, **more)
+    card["training"]["seed"] = 1
+    other = run.rename(run.with_name("ppo_elbows2_seed1"))
+    (other / "best.json").write_text(json.dumps(card))
+    with pytest.raises(ValueError, match="return must be at least the shipped ppo_elbows2_seed0's"):
+        publish([other], **shipped, replace_seeds=True)
+    assert read_policy(shipped["baselines"] / "ppo_elbows2_seed0").card.evaluation["return"] == better
+    # Beside the better one a worse seed may stand.
+    assert publish([other], **shipped) == ["ppo_elbows2_seed1"]
+    publish([other], **shipped, replace_seeds=True, allow_worse=True)
+    assert read_policy(shipped["baselines"] / "ppo_elbows2_seed1").card.evaluation["return"] == better - 1.0
+    assert not list(shipped["baselines"].glob("*seed0*"))
+
+
+def test_damaged_files_of_a_run_are_refused_by_name(run, tmp_path):
+    (run / "evaluations.csv").write_text("steps [-]\n")
+    with pytest.raises(ValueError, match="runs must hold evaluations, got none in"):
+        publish([run], **places(tmp_path))
+    (run / "best.safetensors").write_bytes(b"cut")
+    with pytest.raises(ValueError, match=r"policy weights must be whole safetensors, got .*best\.safetensors"):
+        publish([run], **places(tmp_path))
+    (run / "best.safetensors").unlink()
+    with pytest.raises(ValueError, match=r"got no .*best\.safetensors"):
+        publish([run], **places(tmp_path))
+
+
 def test_old_seeds_go_when_asked(run, tmp_path):
     old = places(tmp_path)
     publish([run], **old)
@@ -84,6 +122,6 @@ def test_best_seed_becomes_the_baseline_and_the_others_stand_beside_the_curves(r
     assert published() == [[11], [3, 5], [3, 5, 11]]
     publish([runs[1]], **places(tmp_path))
     assert published() == [[11], [3, 5], [3, 5, 11]]
-    publish([runs[2]], **places(tmp_path), replace_seeds=True)
+    publish([runs[2]], **places(tmp_path), replace_seeds=True, allow_worse=True)
     assert published() == [[5], [], [5]]
     assert len(list((tmp_path / "baselines").iterdir())) == 2

@@ -1,21 +1,30 @@
 """Training runs end to end on a small budget, keep the best policy, and survive interruption and being cut off."""
 
 import csv
+import errno
 import json
+import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import torch
 from stable_baselines3 import PPO
+from tqdm import tqdm
 
 from agents.learning.callback import Keeper
+from agents.learning.checkpoint import running
 from agents.learning.evaluation import COLUMNS
+from agents.learning.run_folder import RunFolder
 from agents.learning.train import train, train_all
 from agents.learning.training_env import MeteredVectorEnv
 from elbow_gym.baselines.policy import read_policy
@@ -47,7 +56,7 @@ def test_run_leaves_policy_checkpoint_curve_and_tensorboard(done):
     run, result = done
     assert result["finished"]
     assert result["best"]["return"] == pytest.approx(max(row[3] for row in evaluations(run.folder)), rel=1e-9)
-    assert len(list(run.folder.glob("checkpoint_*"))) == 1
+    assert sorted(path.name[-4:] for path in run.folder.glob("checkpoint_*")) == ["0768", "1024"]
     assert PPO.load(run.files.checkpoint().model, device="cpu").num_timesteps == 1024
     events = EventAccumulator(str(next((run.folder / "tensorboard").rglob("events*")).parent)).Reload()
     wanted = {"evaluation/return", *(f"rollout/{name}" for name in ("reward_tracking", "reward_energy"))}
@@ -95,8 +104,7 @@ def cut_down(run, monkeypatch):
 
 def assert_goes_on_to_the_same_policy(whole, cut, checkpoint, monkeypatch):
     """A run that was cut off leaves a checkpoint, goes on from there, and becomes the run that was not cut off."""
-    [left] = cut.folder.glob("checkpoint_*")
-    assert left.name == f"checkpoint_{checkpoint:012}"
+    assert max(path.name for path in cut.folder.glob("checkpoint_*")) == f"checkpoint_{checkpoint:012}"
     seen, on_step = [], Keeper._on_step
     with monkeypatch.context() as patch:
         patch.setattr(Keeper, "_on_step", lambda keeper: seen.append(keeper.num_timesteps) or on_step(keeper))
@@ -193,7 +201,7 @@ def assert_seeds_train_what_they_train_alone(done, folder):
 
 
 def test_seeds_sent_to_processes_train_what_they_train_alone(done, tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.learning.train.ProcessPoolExecutor", PoolHere)
+    monkeypatch.setattr("agents.learning.train.Pool", PoolHere)
     assert_seeds_train_what_they_train_alone(done, tmp_path)
 
 
@@ -216,13 +224,165 @@ def test_no_seed_starts_where_a_folder_holds_another_run(done, tmp_path):
     assert not new.folder.exists()
 
 
-def test_orphan_stops(monkeypatch, tmp_path):
-    class Dead:
-        def is_alive(self):
-            return False
+def test_run_that_nobody_waits_for_any_more_stops(monkeypatch, tmp_path):
+    monkeypatch.setattr("agents.learning.callback.unwanted", lambda: True)
+    run = small_run(tmp_path / "run")
+    result = train(run)
+    assert (result["finished"], result["steps"]) == (False, 4)
+    assert run.files.best() is not None
 
-    monkeypatch.setattr("multiprocessing.parent_process", Dead)
-    assert not train(small_run(tmp_path / "run", checkpoint_seconds=0.0))["finished"]
+
+def test_run_goes_on_where_its_terminal_is_gone(tmp_path, monkeypatch):
+    class Bar(tqdm):
+        def update(self, n=1):
+            raise OSError(errno.EIO, "Input/output error")
+
+    forgotten = []
+    monkeypatch.setattr("agents.learning.callback.tqdm", Bar)
+    monkeypatch.setattr("agents.learning.callback.forget_lost_terminal", lambda: forgotten.append(True))
+    assert train(small_run(tmp_path / "run"))["finished"]
+    assert forgotten
+
+
+def interrupted_after(steps, monkeypatch):
+    on_step = Keeper._on_step
+
+    def interrupt(keeper):
+        if keeper.num_timesteps > steps:
+            raise KeyboardInterrupt
+        return on_step(keeper)
+
+    monkeypatch.setattr(Keeper, "_on_step", interrupt)
+
+
+@pytest.mark.parametrize("apart", [False, True], ids=["one-by-one", "side-by-side"])
+def test_interruption_ends_every_seed_with_a_line_each(tmp_path, monkeypatch, capsys, apart):
+    monkeypatch.setattr("agents.learning.train.Pool", PoolHere)
+    interrupted_after(300, monkeypatch)
+    runs = [small_run(tmp_path / f"seed{seed}", seed=seed) for seed in (0, 1)]
+    with pytest.raises(KeyboardInterrupt):
+        train_all(runs, workers=2 if apart else 1)
+    first, second = capsys.readouterr().out.splitlines()[-2:]
+    assert re.match(r"seed0: not finished after 304 steps, best: return -", first)
+    if apart:
+        assert re.match(r"seed1: not finished after 304 steps, best: return -", second)
+    else:
+        assert second == "seed1: stopped; --resume goes on from its last checkpoint, or starts it"
+        assert not (tmp_path / "seed1" / "run.json").exists()
+
+
+def test_run_that_was_interrupted_while_it_prepared_starts_anew(tmp_path, monkeypatch):
+    run = small_run(tmp_path / "run", **SAC_KILLED)
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr("agents.learning.warm_start.imitate", interrupt)
+        result = train(run)
+    assert (result["finished"], result["steps"], result["best"]) == (False, 0, None)
+    assert run.files.checkpoint() is None
+    assert train(run, resume=True)["finished"]
+    assert evaluations(run.folder)[0][0] == 400
+
+
+def test_seed_that_fails_leaves_the_others_going_on(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("agents.learning.train.Pool", PoolHere)
+    runs = [small_run(tmp_path / f"seed{seed}", seed=seed) for seed in (0, 1)]
+    write = RunFolder.write_evaluations
+
+    def full(folder, rows):
+        if folder.name == "seed0":
+            raise OSError(errno.ENOSPC, "No space left on device", str(folder.path))
+        write(folder, rows)
+
+    monkeypatch.setattr(RunFolder, "write_evaluations", full)
+    with pytest.raises(OSError, match="No space left on device"):
+        train_all(runs)
+    first, second = capsys.readouterr().out.splitlines()[-2:]
+    assert first == f"seed0: failed: No space left on device: {tmp_path / 'seed0'}"
+    assert second.startswith("seed1: finished after 1,024 steps, best: ")
+
+
+def test_error_without_a_name_gets_the_folders_and_a_threads_is_not_printed(tmp_path, monkeypatch, capsys):
+    def fail():
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def step(keeper):
+        thread = threading.Thread(target=fail)
+        thread.start()
+        thread.join()
+        fail()
+
+    monkeypatch.setattr(Keeper, "_on_step", step)
+    hook = threading.excepthook
+    with pytest.raises(OSError, match=f"No space left on device: '{tmp_path / 'run'}'"):
+        train(small_run(tmp_path / "run"))
+    assert "Traceback" not in capsys.readouterr().err
+    assert threading.excepthook is hook
+
+
+def test_torch_has_its_threads_back_after_a_training(tmp_path):
+    before, threads = dict(os.environ), torch.get_num_threads()
+    try:
+        torch.set_num_threads(3)
+        train(small_run(tmp_path / "run", minutes=1e-9))
+        assert torch.get_num_threads() == 3
+    finally:
+        torch.set_num_threads(threads)
+    assert dict(os.environ) == before
+
+
+def test_folder_that_cannot_be_written_is_named_before_a_seed_trains(tmp_path, monkeypatch):
+    monkeypatch.setattr("agents.learning.train.train", lambda *_: pytest.fail("trained"))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OSError, match=r"Not a directory: '.*file/run'"):
+        train_all([small_run(tmp_path / "file" / "run")])
+
+
+def test_disk_without_room_for_the_checkpoints_is_named_before_the_training(tmp_path, monkeypatch):
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=10_000_000))
+    sac = replace(SAC_SMALL, buffer_size=100_000)
+    with pytest.raises(OSError, match=r"No space left on device: \d+ MB are needed, 10 MB are free: '"):
+        train(small_run(tmp_path / "run", algorithm="sac", settings=sac))
+    assert not (tmp_path / "run").exists()
+
+
+def test_checkpoint_of_other_versions_is_refused_naming_both(done, tmp_path, monkeypatch):
+    shutil.copytree(done[0].folder, tmp_path / "run")
+    run = replace(done[0], folder=tmp_path / "run")
+    (run.folder / "result.json").unlink()
+    installed = {**running(), "python": "3.10", "numpy": "9.9"}
+    for name, version in (("python", "3.10"), ("numpy", "9.9")):
+        monkeypatch.setattr("agents.learning.checkpoint.running", lambda name=name: {name: installed[name]})
+        message = (
+            f"{name} of a resumed run must be {re.escape(running()[name])} as when .*1024 was saved, got {version}"
+        )
+        with pytest.raises(ValueError, match=message):
+            train(run, resume=True)
+
+
+@pytest.mark.parametrize("name", ["model.zip", "state.pkl", "progress.json"])
+def test_run_goes_on_from_the_older_checkpoint_to_the_same_policy_where_the_last_is_damaged(
+    done, tmp_path, capsys, name
+):
+    shutil.copytree(done[0].folder, tmp_path / "run")
+    run = replace(done[0], folder=tmp_path / "run")
+    for lost in ("result.json", "evaluations.csv", "best.safetensors"):
+        (run.folder / lost).unlink()
+    damaged = run.files.checkpoint().path / name
+    whole = bytearray(damaged.read_bytes())
+    whole[len(whole) // 2] ^= 1
+    damaged.write_bytes(whole)
+    assert train(run, resume=True)["finished"]
+    said = capsys.readouterr().err
+    assert f"{damaged} is damaged or missing; going on from checkpoint_000000000768" in said
+    assert "best.safetensors; written again from checkpoint_000000000768" in said
+    columns = [[row[:1] + row[3:] for row in evaluations(one.folder)] for one in (done[0], run)]
+    np.testing.assert_allclose(*columns, rtol=1e-12)
+    for entry, array in weights(done[0].folder).items():
+        np.testing.assert_array_equal(weights(run.folder)[entry], array)
+    assert sorted(path.name[-4:] for path in run.folder.glob("checkpoint_*")) == ["0768", "1024"]
 
 
 def test_first_policy_is_where_the_training_starts(done, tmp_path):

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 from agents.evaluation import players
+from agents.evaluation.guest import Guest
 from agents.evaluation.players import CLASSICAL, entries
 from agents.report import colours, command, payload
 from agents.report.command import RESULTS
 from agents.report.page import page
+from agents.report.runs import Visitor, play
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, ELBOW_COLOURS
 from benchmarks.energy import pareto
 from elbow_gym.kinematics import joint_positions
@@ -170,3 +172,26 @@ def test_the_command_writes_the_file_whole_or_not_at_all(runs, document, tmp_pat
     with pytest.raises(ValueError, match="no"):
         command.report(tmp_path / "none" / "report.html")
     assert not list(tmp_path.glob("none/*"))
+
+
+class Still:
+    def predict(self, observation):
+        return np.zeros((len(observation), 10))
+
+
+def test_player_of_a_users_own_is_in_the_page_under_its_label(runs):
+    visitor = Visitor(Guest("my <still> arm", Still()), 0)
+    own = play(visitor, lambda _: None)
+    document = page([*runs, *own], RESULTS)
+    name = "own-my-still-arm"
+    assert [run.key for run in own] == [f"{name}-0-paper", f"{name}-0-on_target"]
+    _, fields = unpacked(document, f"{name}-0-paper")
+    np.testing.assert_allclose(fields["hand"], own[0].series.hand[:, 0], rtol=1e-6)
+    rows = re.findall(
+        rf'<tr data-set="nominal" data-regime="(.)" data-bearing="0" data-controller="{name}".*', document
+    )
+    assert rows == ["A", "B", "C"]
+    assert "my &lt;still&gt; arm</button>" in document
+    assert f"--controller-{name}: #" in document
+    plain = json.loads(re.search(r'<script type="application/json"[^>]*>(.*?)</script>', document, re.DOTALL)[1])
+    assert plain["controllers"][name]["name"] == "my <still> arm"

@@ -61,7 +61,7 @@ def test_short_run_writes_its_tables_and_figure_and_prints_where(tmp_path, monke
     rows = energy(tmp_path / "out", episodes=1, folder=tmp_path / "cache", parallel=False, command="as typed")
     assert [(row.controller, row.regime) for row in rows] == [(name, r) for name in ("ppo", "lqr") for r in "ABC"]
     written = {path.name for path in (tmp_path / "out").iterdir()}
-    assert written == {"energy.csv", "energy.md", "energy.json", "energy.png"}
+    assert written == {"energy.csv", "energy.md", "energy.json", "energy.png", "effort.csv"}
     assert json.loads((tmp_path / "out" / "energy.json").read_text())["command"] == "as typed"
     with Image.open(tmp_path / "out" / "energy.png") as picture:
         assert picture.size[0] >= 1500  # sharp at the README's 900 pixels

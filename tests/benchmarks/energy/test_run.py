@@ -85,6 +85,7 @@ def test_benchmark_writes_tables_figures_and_context(measured):
     expected |= {
         "energy_brief.md",
         "energy_short.md",
+        "effort.csv",
         "energy.json",
         "energy.png",
         "energy_joints.png",

@@ -86,7 +86,7 @@ def test_sentence_gives_the_energies_and_their_ratio():
 def test_report_ends_with_where_the_files_are(tmp_path):
     text = report(rows(["pd"]), 3, False, [tmp_path / "latest"])
     files = " ".join(text.split("\n\n")[-1].split())
-    assert files.startswith(f"Files: {tmp_path / 'latest'} (energy.csv, energy.md, energy.png)")
+    assert files.startswith(f"Files: {tmp_path / 'latest'} (energy.csv, energy.md, energy.png, effort.csv)")
     assert "interquartile mean over 3 start poses" in " ".join(text.split())
 
 

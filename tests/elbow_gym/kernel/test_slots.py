@@ -118,12 +118,11 @@ def test_no_two_live_quantities_share_a_row(switches):
 
     def run(reuse):
         known = slots.offsets(1, **on, exponential="classical" not in switches, reuse=reuse)
-        advance = instances(known, "interpreted", lambda function, **_: function)[control.advance.__name__]
+        entry = instances(known, "interpreted", lambda function, **_: function)[control.control_step.__name__]
         state, parameters, voltage = moving_arms(on)
         summary = np.zeros((len(state), rows.SUMMARY_COLUMNS + 2))
-        assert (
-            advance(state, parameters, voltage, np.array([4, 7]), np.array([1e-3, 2e-3]), summary, 0, len(state)) == 0
-        )
+        own = (state, parameters, np.array([4, 7]), np.array([1e-3, 2e-3]), summary)
+        assert entry(voltage, voltage, control.NO_QUEUE, *own, *control.NO_TASK, 0, len(state)) == 0
         return state, summary
 
     for shared, own in zip(run(True), run(False), strict=True):

@@ -8,6 +8,7 @@ import pytest
 
 from elbow_gym import Circle, Simulator, paper_arm
 from elbow_gym.kernel.observe import observe
+from elbow_gym.kernel.rows import AHEAD, PAID, PHASE, TASK_COLUMNS, TURN
 from elbow_gym.kinematics import hand_position
 from elbow_gym.task import observation as task
 from elbow_gym.task.reward import Price
@@ -32,12 +33,16 @@ def arms():
 
 
 def look(simulator, price=FREE, spent=0.0, paid=None):
-    path = np.repeat(CIRCLE.path[None], 3, axis=0)
+    asked = np.zeros((3, TASK_COLUMNS))
     # Two control periods of 0.1 rad on.
-    target = (path, ANGLE - 0.2, np.full(3, 0.1), np.full(3, 2), np.full(3, CIRCLE.rate * task.LOOKAHEAD))
-    sight, paid = blank(3, LAYOUT.size), np.full(3, spent) if paid is None else paid
-    layout = (LAYOUT.starts, LAYOUT.scale, LAYOUT.high)
-    observe(*simulator.raw, POSE, *target, *layout, tuple(price), paid, *sight, 0, 3)
+    asked[:, PHASE], asked[:, TURN], asked[:, AHEAD] = ANGLE - 0.2, 0.1, CIRCLE.rate * task.LOOKAHEAD
+    asked[:, PAID] = spent if paid is None else paid
+    sight, path = blank(3, LAYOUT.size), np.repeat(CIRCLE.path[None], 3, axis=0)
+    layout = (POSE, LAYOUT.starts, np.stack([LAYOUT.scale, LAYOUT.high]))
+    clock = np.full((3, 2), 2)
+    observe(*simulator.raw[:2], clock, asked, path, *layout, np.array(price), *sight, 0, 3)
+    if paid is not None:
+        paid[:] = asked[:, PAID]
     return sight
 
 

@@ -56,7 +56,7 @@ def test_numbers_must_be_finite_numbers(name, value, rule):
         ({"elbows": (4, 11)}, "elbows must be joints 3 to 10 (joints 1 and 2 sit on the base), got 11 in (4, 11)"),
         ({"elbows": (4, 4)}, "elbows must not repeat a joint, got (4, 4)"),
         ({"elbows": (4.0,)}, "elbows must be joint numbers (integers), got (4.0,)"),
-        ({"arm": "human"}, "arm must be one of ['paper'], got 'human'"),
+        ({"arm": "human"}, "arm must be one of ['paper'] or a .json file, got 'human'"),
         ({"arm": 10}, "arm must be a preset name, a dict or ArmParameters, got 10"),
         ({"action_unit": "ampere"}, "action_unit must be one of ('fraction', 'volt'), got 'ampere'"),
         ({"start": "random"}, "start must be one of ('paper', 'on_target'), got 'random'"),

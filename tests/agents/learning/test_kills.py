@@ -1,0 +1,107 @@
+"""Trainings killed at random moments, disks that fill and folders that vanish in the middle, two benchmarks at once."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.learning.train import train
+from elbow_gym.baselines.policy import read_policy
+from tests.support.kills import long_run
+
+ROOT = Path(__file__).parents[3]
+KILLS, SEED = 30, 20_240_601
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", ["ppo", "sac"])
+def test_training_that_was_killed_at_random_moments_ends_bit_for_bit_as_the_one_that_was_not(tmp_path, kind):
+    whole = long_run(kind, tmp_path / "whole")
+    result = train(whole)
+    command = [sys.executable, "-m", "tests.support.kills", kind, str(tmp_path / "killed"), str(KILLS), str(SEED)]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    print(ended.stdout)
+    *kills, last = [line for line in ended.stdout.splitlines() if line.startswith(("killed ", "finished", "failed"))]
+    assert last == "finished", ended.stderr
+    assert len(kills) >= KILLS // 2
+    # Most leave a checkpoint that the next one goes on from.
+    assert len({line.split()[-1] for line in kills}) > KILLS // 6
+    assert "damaged" not in ended.stderr
+    killed = long_run(kind, tmp_path / "killed")
+    assert killed.files.result()["best"] == result["best"]
+    columns = [[row[:1] + row[3:] for row in run.files.evaluations()] for run in (whole, killed)]
+    assert columns[0] == columns[1]
+    for name, weights in read_policy(whole.folder / "best").weights.items():
+        np.testing.assert_array_equal(read_policy(killed.folder / "best").weights[name], weights)
+
+
+FULL = """
+import os, resource, shutil, sys
+from pathlib import Path
+from agents.learning.callback import Keeper
+from tests.support.kills import long_run
+from agents.learning.train import train_all
+on_step = Keeper._on_step
+def step(keeper):
+    if keeper.num_timesteps > 4096:
+        {trouble}
+    return on_step(keeper)
+Keeper._on_step = step
+from agents.cli import Commands
+app = Commands("program", "Trains until there is trouble.")
+@app.command
+def go() -> None:
+    train_all([long_run("ppo", Path(sys.argv[1]))])
+app.run(["go"])
+"""
+TROUBLES = {
+    "full": ("resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))", "File too large: "),
+    "gone": ("shutil.rmtree(sys.argv[1], ignore_errors=True)", "No such file or directory: "),
+    "forbidden": ("os.geteuid() or os.seteuid(65534)", "Permission denied: "),
+}
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("trouble", TROUBLES)
+def test_trouble_with_the_disk_in_the_middle_ends_with_a_sentence_and_the_run_goes_on_later(tmp_path, trouble):
+    if trouble == "forbidden" and os.geteuid() != 0:
+        pytest.skip("only the superuser can give up a permission in the middle")
+    code, message = TROUBLES[trouble]
+    folder = tmp_path / "run"
+    command = [sys.executable, "-c", FULL.format(trouble=code), str(folder)]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    print(ended.stderr.splitlines()[-1])
+    assert ended.returncode == 1
+    assert ended.stderr.splitlines()[-1].startswith(f"error: {message}{folder}"), ended.stderr
+    assert "Traceback" not in ended.stderr
+    assert ended.stdout.splitlines()[-1].startswith(f"run: failed: {message}{folder}")
+    run = long_run("ppo", folder)
+    if trouble != "gone":
+        assert run.files.checkpoint().progress()["steps"] > 0
+        whole = train(long_run("ppo", tmp_path / "whole"))
+        assert train(run, resume=True)["best"] == whole["best"]
+
+
+@pytest.mark.soak
+def test_two_energy_benchmarks_at_once_in_one_folder_write_the_same(tmp_path):
+    code = (
+        "import sys; from pathlib import Path; from benchmarks.energy.run import energy;"
+        "energy(Path(sys.argv[1]), episodes=1, folder=Path(sys.argv[2]), parallel=False)"
+    )
+    command = [sys.executable, "-c", code]
+    both = [
+        subprocess.Popen([*command, str(tmp_path / "out"), str(tmp_path / "cells")], cwd=ROOT, stderr=subprocess.PIPE)
+        for _ in range(2)
+    ]
+    for process in both:
+        err = process.communicate()[1].decode()
+        assert process.returncode == 0, err
+        assert "measured again" not in err
+    assert not [path for folder in ("out", "cells") for path in (tmp_path / folder).glob(".*")]
+    alone = [*command, str(tmp_path / "alone"), str(tmp_path / "own")]
+    subprocess.run(alone, cwd=ROOT, capture_output=True, check=True)
+    assert (tmp_path / "out" / "energy.csv").read_bytes() == (tmp_path / "alone" / "energy.csv").read_bytes()
+    assert len(list((tmp_path / "cells").iterdir())) == len(list((tmp_path / "own").iterdir()))
