@@ -173,6 +173,36 @@ def export(
 
 
 @app.command
+def dataset(
+    player: Annotated[str, Positional, arg(metavar="WHAT")],
+    name: Annotated[str, Positional, arg(metavar="NAME")],
+    /,
+    task: OmitArgPrefixes[TaskOptions] = TASK,
+    episodes: Count = 40,
+    seed: Seed = 0,
+    noise: float = 0.0,
+    trust: bool = False,
+) -> None:
+    """Records a player's episodes as a Minari data set, in the folder that MINARI_DATASETS_PATH names.
+
+    Args:
+        player: Controller, as for `evaluate`.
+        name: Minari's id of the data set, such as "elbow_gym/ppo-v0".
+        task: Environment.
+        episodes: Number of episodes.
+        seed: Seed of the first start; the others' follow.
+        noise: Standard deviation of normal noise on the actions, as a share of the largest.
+        trust: Whether to read a .zip, whose pickles can run any code when they are read.
+    """
+    from agents.evaluation.dataset import record_episodes, write_dataset
+    from agents.evaluation.players import find_player
+
+    found = find_player(player, task.elbows, task.env, task.arguments(), trust)
+    data = write_dataset(found, name, record_episodes(found, episodes, seed, noise))
+    print(f"{name}: {data.total_episodes} episodes, {data.total_steps} steps")
+
+
+@app.command
 def report(
     output: Path = Path("report.html"),
     players: Annotated[UseAppendAction[tuple[str, ...]], arg(name="with", metavar="WHAT")] = (),

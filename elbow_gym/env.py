@@ -137,7 +137,7 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     ## Version History
 
-    * v0: first version. Until the release of 0.1.0 its figures may move, as they did with the exponential steps and with
+    * v0: first version. Until the release of 0.1.0 its figures may move, as they did with the exponential steps and
       starts on the table; the changelog says how. From then on whatever moves an episode's figures is a new version.
     """
 

@@ -14,45 +14,30 @@ from __future__ import annotations
 from typing import Any
 
 import d3rlpy
-import gymnasium as gym
 import minari
 import numpy as np
-from minari.data_collector import EpisodeBuffer
 
+from agents.evaluation.dataset import record_episodes, write_dataset
+from agents.evaluation.players import find_player
 from agents.recipes.race import AfterUpdate, main
-from agents.shipped.seeds import load_policy
 
 DATASET = "elbow_gym/ppo-elbows2-v0"
 GRADIENT_STEPS = 1000
 """Gradient steps between two evaluations."""
 
 
-def record(episodes: int = 40, seed: int = 0, noise: float = 0.1) -> list[EpisodeBuffer]:
-    """Whole episodes of the shipped PPO policy, with normal noise of a standard deviation of `noise` on its actions."""
-    policy = load_policy("ppo", elbows=2)
-    env = gym.make_vec("elbow_gym:ElbowArm-v0", episodes, autoreset_mode="Disabled", start_noise=0.1)
-    generator = np.random.default_rng(seed)
-    observations, steps = [env.reset(seed=seed)[0]], []
-    over = np.zeros(episodes, dtype=bool)
-    while not over.any():  # All episodes are equally long.
-        action = policy.predict(observations[-1])[0]
-        action = np.clip(action + noise * generator.standard_normal(action.shape), -1.0, 1.0).astype(np.float32)
-        observation, reward, terminated, truncated, _ = env.step(action)
-        steps.append((action, reward, terminated, truncated))
-        observations.append(observation)
-        over = terminated | truncated
-    env.close()
-    stacked = np.stack(observations), *(np.stack(parts) for parts in zip(*steps, strict=True))
-    names = "observations", "actions", "rewards", "terminations", "truncations"
-    return [EpisodeBuffer(id=i, **{n: x[:, i] for n, x in zip(names, stacked, strict=True)}) for i in range(episodes)]
+def data_set(episodes: int = 40, seed: int = 0, noise: float = 0.1) -> minari.MinariDataset:
+    """Data set of the shipped PPO policy from scattered starts; one of the same name is replaced.
 
-
-def write(episodes: list[EpisodeBuffer], name: str = DATASET) -> minari.MinariDataset:
-    """Data set in Minari's folder, which the variable MINARI_DATASETS_PATH names; one of the same name is replaced."""
-    if name in minari.list_local_datasets():
-        minari.delete_dataset(name)
-    env = gym.make("elbow_gym:ElbowArm-v0")
-    return minari.create_dataset_from_buffers(name, episodes, env=env, algorithm_name="PPO", author="elbow_gym")
+    Args:
+        episodes: number of episodes.
+        seed: seed of the starts and of the noise.
+        noise: standard deviation of normal noise on the actions, as a share of the largest.
+    """
+    if DATASET in minari.list_local_datasets():
+        minari.delete_dataset(DATASET)
+    player = find_player("ppo", 2, arguments={"start_noise": 0.1})
+    return write_dataset(player, DATASET, record_episodes(player, episodes, seed, noise))
 
 
 def replay_buffer(dataset: minari.MinariDataset) -> d3rlpy.dataset.ReplayBuffer:
@@ -73,7 +58,7 @@ def train(steps: int = 10_000, seed: int = 0, after_update: AfterUpdate = lambda
     """Trains d3rlpy's BC for a number of gradient steps, which `after_update` counts in place of control periods."""
     d3rlpy.seed(seed)
     algorithm = d3rlpy.algos.BCConfig(batch_size=256).create(device="cpu")
-    data = replay_buffer(write(record(seed=seed)))
+    data = replay_buffer(data_set(seed=seed))
     for epoch, _ in algorithm.fitter(
         data,
         n_steps=steps,

@@ -17,7 +17,19 @@ from agents.cli import Commands, Count, JsonObject, Seed, spelled
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = {
-    "agents": ("reproduce", "train", "clone", "publish", "evaluate", "bound", "verify", "export", "report", "watch"),
+    "agents": (
+        "reproduce",
+        "train",
+        "clone",
+        "publish",
+        "evaluate",
+        "bound",
+        "verify",
+        "export",
+        "dataset",
+        "report",
+        "watch",
+    ),
     "benchmarks": ("energy", "learning", "optimal", "speed"),
 }
 

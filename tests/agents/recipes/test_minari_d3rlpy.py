@@ -22,7 +22,7 @@ def _folder(tmp_path, monkeypatch):
 
 def test_every_action_keeps_the_observation_that_it_answers():
     policy = load_policy("ppo", elbows=2)
-    data = minari_d3rlpy.replay_buffer(minari_d3rlpy.write(minari_d3rlpy.record(episodes=3, noise=0.0)))
+    data = minari_d3rlpy.replay_buffer(minari_d3rlpy.data_set(episodes=3, noise=0.0))
     assert [episode.actions.shape for episode in data.episodes] == [(250, 10)] * 3
     for episode in data.episodes:
         assert not episode.terminated
@@ -31,7 +31,7 @@ def test_every_action_keeps_the_observation_that_it_answers():
 
 def test_data_set_of_the_same_name_is_replaced():
     for count in (2, 1):
-        data = minari_d3rlpy.write(minari_d3rlpy.record(episodes=count))
+        data = minari_d3rlpy.data_set(episodes=count)
     assert data.total_episodes == 1
 
 
