@@ -1,6 +1,7 @@
 """Configuration of all tests: hypothesis's profile, windows that nobody sees, one thread, markers, the paper's arm."""
 
 import os
+import signal
 
 # Small networks and matrices lose more by handing work between threads than they gain; processes started here agree.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -34,3 +35,11 @@ def pytest_collection_modifyitems(items):
 def arm():
     """The paper's arm; frozen, so one for all tests."""
     return paper_arm()
+
+
+@pytest.fixture
+def interruptible():
+    """Ctrl-C interrupts, also where the tests run in the background of a shell, which has it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

@@ -158,6 +158,7 @@ def test_error_of_the_system_ends_with_one_sentence(app, error, line):
         app.run(["fail"])
 
 
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)])
 def test_signal_ends_with_the_shells_code_and_without_a_traceback(app, capsys, number, code):
     cleaned = []

@@ -111,6 +111,7 @@ def test_an_error_is_raised_when_no_share_is_worked_on_any_more(failing):
     assert sorted(written) == [first for first in range(3) if first != failing]
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_is_raised_when_no_share_is_worked_on_any_more():
     written, main = [], threading.main_thread()
 
