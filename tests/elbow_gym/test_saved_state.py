@@ -3,12 +3,13 @@
 import copy
 import functools
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import data_equivalence
 
-from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, Simulator
+from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, Simulator, paper_arm
 from elbow_gym.kernel.build import kernel
 
 RANDOM = {
@@ -120,7 +121,7 @@ def test_a_wrong_state_is_refused_by_name_before_anything_changes(path, value, m
         ({"integrator": "rk4"}, "the same integrator, 'exponential', got 'rk4'"),
         ({"control_frequency": 100.0}, "the same control_frequency, 50.0, got 100.0"),
         ({"payload": 0.1}, "the same payload, 0.0, got 0.1"),
-        ({"gear_coulomb_friction": 0.001}, "the same arm, "),
+        ({"arm": replace(paper_arm(), gravity=9.0)}, "the same arm, "),
     ],
 )
 def test_a_state_of_other_settings_is_refused(other, message):
