@@ -21,6 +21,7 @@ def elsewhere(**environment):
     return hashes, int(compiled)
 
 
+@pytest.mark.slow
 def test_another_process_repeats_the_bits_and_compiles_nothing():
     here = [single(0), batch(0)]
     assert elsewhere() == (here, 0)

@@ -58,6 +58,7 @@ def test_gravity_feed_forward_alone_holds_the_start_pose(arm, elbows):
     np.testing.assert_allclose(simulator.q[0], env.episodes.pose, atol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("elbows", [0, 1, 2])
 def test_computed_torque_tracks_without_the_paper_pds_sag(elbows):
     def error_rms(name):
@@ -72,6 +73,7 @@ def test_computed_torque_tracks_without_the_paper_pds_sag(elbows):
     assert error_rms("computed_torque") < 0.2 * error_rms("pd")
 
 
+@pytest.mark.slow
 def test_smooth_start_costs_less_than_the_step_and_is_there_sooner():
     figures = {}
     for name in ("pd", "pd_smooth"):

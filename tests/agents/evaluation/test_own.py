@@ -157,6 +157,7 @@ def test_model_of_stable_baselines3_acts_as_it_does_there(here, algorithm):
         other.make(ElbowArmVectorEnv(1, **other.settings.arguments))
 
 
+@pytest.mark.slow
 def test_classical_controllers_play_on_another_arm(here):
     (here / "mine.json").write_text(json.dumps(six_joint_arm().to_dict()))
     player = find_player("computed_torque", (4,), arguments={"arm": "mine.json", "start_noise": 0.0})

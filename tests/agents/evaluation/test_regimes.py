@@ -67,6 +67,7 @@ def test_regimes_are_counted_from_the_episodes_of_their_start():
     assert list(in_all_regimes(player, SEEDS, regimes=REGIMES[:1])) == ["A"]
 
 
+@pytest.mark.slow
 def test_bar_of_the_command_ends_at_100_percent_and_shows_no_other(monkeypatch, capsys):
     def play(player, seeds, progress):
         for done in (0, 125, 250, 500):

@@ -200,6 +200,7 @@ def assert_seeds_train_what_they_train_alone(done, folder):
     assert any((weights(folder / "seed1")[name] != alone).any() for name, alone in weights(done[0].folder).items())
 
 
+@pytest.mark.slow
 def test_seeds_sent_to_processes_train_what_they_train_alone(done, tmp_path, monkeypatch):
     monkeypatch.setattr("agents.learning.train.Pool", PoolHere)
     assert_seeds_train_what_they_train_alone(done, tmp_path)

@@ -56,6 +56,7 @@ def test_a_run_that_was_made_before_starts_no_process_and_compiles_nothing(tmp_p
     assert measure(chosen) == rows
 
 
+@pytest.mark.slow
 def test_short_run_writes_its_tables_and_figure_and_prints_where(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(run, "cells", lambda parts: [Cell("ppo", 2), Cell("lqr", 2)])
     rows = energy(tmp_path / "out", episodes=1, folder=tmp_path / "cache", parallel=False, command="as typed")

@@ -52,6 +52,7 @@ def started(steps=3, **settings):
     return env
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", RENDER_MODES)
 @pytest.mark.parametrize("name", ["ElbowArm-v0", "ElbowArmTable-v0", "ElbowArmRandom-v0"])
 def test_both_checkers_find_nothing_in_any_mode(name, mode):

@@ -35,6 +35,7 @@ def critics():
     return QuadraticCritics(Sharpened(4, [slice(1, 4)]), 3, (6, 7), rank=2), torch.randn(5, 4)
 
 
+@pytest.mark.slow
 def test_critics_are_two_plain_networks_side_by_side():
     both, observation = critics()
     for k in range(2):
@@ -65,6 +66,7 @@ def test_quadratic_is_the_form_that_its_parts_say():
     assert not quadratic.detach()(departure.detach()).requires_grad
 
 
+@pytest.mark.slow
 def test_linear_loss_pulls_no_harder_however_large_the_error():
     value = torch.tensor([[0.0], [0.1], [2.0], [2000.0]], requires_grad=True)
     loss = small(huber_delta=0.2)._loss(value, torch.zeros(4, 1))
@@ -260,6 +262,7 @@ def test_saved_model_comes_back_with_its_centre(tmp_path):
     assert any(name.startswith("center") for name in again.policy.state_dict())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [{}, {"use_sde": True}, {"n_steps": 3}, {"gradient_steps": -1, "train_freq": 4}])
 def test_same_seed_gives_the_same_weights(arguments):
     first, second = (small(**arguments).learn(60).policy.state_dict() for _ in range(2))
