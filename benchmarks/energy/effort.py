@@ -13,6 +13,11 @@ from benchmarks.energy.cells import Cell, players
 HEADER = ("controller", "elbows", "decision [ms]", "processor", "vectors", "python", "numpy")
 
 
+def timed(cell: Cell) -> bool:
+    """Whether the time of a decision of the cell's controllers is taken, for one arm."""
+    return cell.part == "nominal" and cell.gain == 1.0
+
+
 def save(cells: Sequence[Cell], path: Path) -> None:
     """Measures the best training seed of every nominal cell, here and one after the other, and writes a row for each.
 
@@ -23,6 +28,6 @@ def save(cells: Sequence[Cell], path: Path) -> None:
     rows = [
         [cell.controller, cell.elbows, f"{1e3 * decision_time(players(cell, every_seed=False)[0]):.3g}", *place]
         for cell in cells
-        if cell.part == "nominal" and cell.gain == 1.0
+        if timed(cell)
     ]
     write_csv(path, HEADER, rows)

@@ -195,6 +195,8 @@ def batches(todo: Sequence[Cell], plan: Plan) -> list[tuple[Any, int]]:
                 found.append((player.settings, starts * len(plan.seeds)))
             if player.name == "lqr":
                 found.append((player.settings, LQR_ARMS))
+            if effort.timed(cell):
+                found.append((player.settings, 1))
     return found
 
 

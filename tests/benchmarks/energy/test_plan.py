@@ -42,8 +42,8 @@ def test_no_episodes_are_refused():
 def test_kernels_that_are_compiled_before_are_those_of_the_batches_that_run():
     chosen = plan(full=False)
     arms = {(settings.table, count) for settings, count in batches(chosen.cells, chosen)}
-    # Three poses, twice as many with both starts side by side, and the LQR's nudges; no single arm.
-    assert arms == {(False, 3), (False, 6), (False, LQR_ARMS)}
+    # Three poses, twice as many with both starts side by side, the LQR's nudges, and one arm whose decisions are timed.
+    assert arms == {(False, 1), (False, 3), (False, 6), (False, LQR_ARMS)}
     tabletop = [settings.table for settings, _ in batches(cells(["table"]), chosen)]
     assert set(tabletop) == {True}
 
