@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -34,9 +35,14 @@ class Trajectory:
         write_whole(path, lambda temporary: np.savez_compressed(temporary, **arrays))
 
     @classmethod
-    def load(cls, path: Path) -> Trajectory:
-        """Reads what `save` wrote. ValueError naming the file when it is cut, altered or holds what is not finite."""
-        arrays = read_arrays(path)
+    def load(cls, path: Path, beside: Collection[str] = ()) -> Trajectory:
+        """Reads what `save` wrote. ValueError naming the file when it is cut, altered or holds what is not finite.
+
+        Args:
+            path: the .npz.
+            beside: names of arrays that the file may hold beside those of a trajectory.
+        """
+        arrays = {name: array for name, array in read_arrays(path).items() if name not in beside}
         names = [field.name for field in fields(cls)]
         if set(arrays) != set(names):
             raise ValueError(f"{path} must hold the arrays {names}, got {sorted(arrays)}")

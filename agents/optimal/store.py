@@ -25,6 +25,8 @@ SOURCES = ("agents/optimal", "agents/control", "elbow_gym/simulation", "elbow_gy
 SCALES = {"target": 0.1, "start": 0.3, "payload": 0.15, "weight": 0.5}
 """Differences that count as a distance of one: targets (root mean square) [m], start pose (largest) [rad], payload
 [kg], logarithm of the energy's weight over the tracking's [-]."""
+BESIDE = ("x", "bound_multipliers", "multipliers", "target")
+"""Names of the arrays beside a trajectory's: the program's variables and multipliers, and the targets."""
 FARTHEST = 6.0
 """Distance up to which a task is solved from another one."""
 
@@ -57,7 +59,7 @@ class Store:
         card, arrays = self._files(self.key(problem))
         if not (card.is_file() and arrays.is_file()):
             return None
-        return json.loads(card.read_text(encoding="utf-8"))["figures"], Trajectory.load(arrays)
+        return json.loads(card.read_text(encoding="utf-8"))["figures"], Trajectory.load(arrays, beside=BESIDE)
 
     def save(self, problem: Problem, figures: dict[str, Any], trajectory: Trajectory, point: Point) -> None:
         """Writes a solved problem's two files; the card last, so that it counts only when both are there."""
