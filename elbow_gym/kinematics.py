@@ -57,18 +57,22 @@ def constraint_jacobian(arm: ArmParameters, q: ArrayLike, elbows: Sequence[int])
 
 
 def on_table(arm: ArmParameters, q: ArrayLike, elbows: Sequence[int]) -> Array:
-    """The pose with the elbows at z = 0 [rad], shape (n,), that Newton's method finds from a pose; C(q) = 0 of eq. 18.
+    """The pose with the elbows at z = 0 [rad], shape (n,), that changes pitches least; C(q) = 0 of eq. 18.
+
+    Newton's method in the pitches, whose pose is also `Simulator.on_table`'s.
 
     Raises:
         ValueError: it finds none, since the links are too short or the pose is singular.
     """
     q = np.array(q, dtype=np.float64)
-    height = elbow_heights(arm, q, elbows)
+    before = np.tri(arm.n_joints)[[elbow - 2 for elbow in elbows]]
     for _ in range(NEWTON_ROUNDS):
+        height = elbow_heights(arm, q, elbows)
         if np.abs(height).max(initial=0.0) < NEWTON_TOLERANCE:
             return q
-        q = q - np.linalg.pinv(constraint_jacobian(arm, q, elbows)) @ height
-        height = elbow_heights(arm, q, elbows)
+        slope = -arm.of_links("length") * np.sin(pitches(q))
+        turn = np.linalg.pinv(before * slope) @ height
+        q = q - np.diff(turn, prepend=0.0)
     raise ValueError(f"elbows must be able to lie on the table, got heights {height} m after {NEWTON_ROUNDS} rounds")
 
 

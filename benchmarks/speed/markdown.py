@@ -11,7 +11,7 @@ from benchmarks.speed.precision import ERROR, Method, Point, best
 from benchmarks.speed.rows import RATIO, Row, ratios
 
 EQUAL_COST = "equal cost, not equal accuracy"
-"""What a comparison of a step with MuJoCo's RK4 step is."""
+"""Note beside every comparison of a step with MuJoCo's RK4 step, which is of first order here."""
 HEADER = (
     "who",
     "what",

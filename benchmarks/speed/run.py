@@ -14,7 +14,7 @@ from typing import Any
 
 from agents.files import write_csv, write_text, write_whole
 from agents.machine import machine, versions
-from agents.workers import compile_before
+from agents.workers import compile_before, cores
 from benchmarks.blocks import publish_blocks
 from benchmarks.machine import LATEST_SPEED, PACKAGES, RESULTS
 from benchmarks.speed import markdown
@@ -185,7 +185,7 @@ def speed(output: Path = LATEST_SPEED, quick: bool = False, publish: bool = Fals
         "seconds": round(time.monotonic() - started, 1),
         "machine": {
             **machine(),
-            "cores": os.cpu_count(),
+            "cores": cores(),
             "load_average_before": load,
         },
         "versions": versions(*PACKAGES, "mujoco", "pin", "imageio"),

@@ -13,7 +13,7 @@ from tests.support.random_settings import draw
 
 SEED = 22
 BALANCE = 1e-3
-"""What may be missing of the energy that was drawn and lost."""
+"""Largest part of the energy that was drawn and lost that may be missing [-]."""
 TOLD = 1e-6
 """Constraint residual from which on infos say that motion and energy are not to be trusted [m/s^2]."""
 

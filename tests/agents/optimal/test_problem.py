@@ -1,4 +1,4 @@
-"""What the bound refuses, and when two tasks are the same question."""
+"""Refusals of the bound by name, and tasks that are the same question."""
 
 from dataclasses import replace
 
