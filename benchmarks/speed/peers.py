@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -26,48 +27,34 @@ from benchmarks.speed.own import (
     timed,
     voltages,
 )
+from elbow_gym import export
 from elbow_gym.parameters import ArmParameters
 
 MUJOCO, PINOCCHIO = "MuJoCo", "Pinocchio"
 C_LOOP, PYTHON_LOOP = "C loop", "Python loop"
 TOLERANCE = 1e-6
 BALL_RADIUS, PLANE_MARGIN = 0.01, 0.001  # [m]
+TOUCHING = {"condim": "1", "margin": str(PLANE_MARGIN)}
+"""Attributes of balls and planes, which touch without friction."""
 
 
 def mjcf(arm: ArmParameters, elbows: tuple[int, ...], integrator: str) -> str:
-    """The arm for MuJoCo: native DC motors, each elbow a frictionless ball between a floor and a ceiling.
+    """The arm as `elbow_gym.export` writes it, each elbow a frictionless ball between a floor and a ceiling.
 
-    Bodies have z along the link; armature is the reflected rotor inertia, damping all viscous friction. Both planes
-    touch the ball within their margin, so that together they hold it from above and below.
+    Both planes touch the ball within their margin, so that together they hold it from above and below. Sites and shapes
+    that only show the arm are left out, since MuJoCo would spend time on them.
     """
-    bodies = ""
-    for k, (link, motor) in enumerate(zip(arm.links, arm.motors, strict=True)):
-        base = arm.links[k - 1].length if k else 0.0
-        # Link 1 only yaws, so its inertia across is free; MuJoCo wants it safely above half of the one along.
-        across = link.transverse_inertia * (1.0 if k else 2.0)
-        damping = arm.joint_viscous_friction[k] + motor.reflected_viscous_friction
-        ball = f'<geom type="sphere" size="{BALL_RADIUS}" conaffinity="1"/>' if k + 1 in elbows else ""
-        bodies += f"""
-            <body pos="0 0 {base!r}">
-              <joint name="joint{k}" axis="{"0 1 0" if k else "0 0 1"}" armature="{motor.reflected_inertia!r}"
-                     damping="{damping!r}"/>
-              <inertial pos="0 0 {link.length / 2.0!r}" mass="{link.mass!r}"
-                        diaginertia="{across!r} {across!r} {link.axial_inertia!r}"/>{ball}"""
-    plane = '<geom type="plane" size="20 20 1" contype="1" pos="0 0 {}" zaxis="0 0 {}"/>'
-    planes = plane.format(-BALL_RADIUS, 1) + plane.format(BALL_RADIUS, -1) if elbows else ""
-    motors = "".join(
-        f'<dcmotor joint="joint{k}" motorconst="{motor.joint_torque_constant!r}"'
-        f' resistance="{motor.armature_resistance!r}" inductance="{motor.armature_inductance!r}"/>'
-        for k, motor in enumerate(arm.motors)
-    )
-    return f"""
-        <mujoco>
-          <compiler angle="radian" boundmass="0" boundinertia="0"/>
-          <option timestep="{TIMESTEP}" gravity="0 0 {-arm.gravity!r}" integrator="{integrator}"/>
-          <default><geom contype="0" conaffinity="0" condim="1" margin="{PLANE_MARGIN}"/></default>
-          <worldbody>{planes}{bodies}{"</body>" * arm.n_joints}</worldbody>
-          <actuator>{motors}</actuator>
-        </mujoco>"""
+    root = ElementTree.fromstring(export.mjcf(arm, timestep=TIMESTEP))
+    root.find("option").set("integrator", integrator)
+    for k, body in enumerate(list(root.iter("body")), start=1):
+        for shown in (*body.findall("geom"), *body.findall("site")):
+            body.remove(shown)
+        if k in elbows:
+            ElementTree.SubElement(body, "geom", {**TOUCHING, "size": str(BALL_RADIUS), "conaffinity": "1"})
+    for z, up in ((-BALL_RADIUS, 1), (BALL_RADIUS, -1)) if elbows else ():
+        plane = {"type": "plane", "size": "20 20 1", "contype": "1", "pos": f"0 0 {z}", "zaxis": f"0 0 {up}"}
+        ElementTree.SubElement(root.find("worldbody"), "geom", {**TOUCHING, **plane})
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def mujoco_model(arm: ArmParameters, elbows: tuple[int, ...], integrator: str = "RK4") -> tuple[Any, Any]:
