@@ -66,13 +66,14 @@ def on_table(arm: ArmParameters, q: ArrayLike, elbows: Sequence[int]) -> Array:
     """
     q = np.array(q, dtype=np.float64)
     before = np.tri(arm.n_joints)[[elbow - 2 for elbow in elbows]]
+    height = elbow_heights(arm, q, elbows)
     for _ in range(NEWTON_ROUNDS):
-        height = elbow_heights(arm, q, elbows)
         if np.abs(height).max(initial=0.0) < NEWTON_TOLERANCE:
             return q
         slope = -arm.of_links("length") * np.sin(pitches(q))
         turn = np.linalg.pinv(before * slope) @ height
         q = q - np.diff(turn, prepend=0.0)
+        height = elbow_heights(arm, q, elbows)
     raise ValueError(f"elbows must be able to lie on the table, got heights {height} m after {NEWTON_ROUNDS} rounds")
 
 
