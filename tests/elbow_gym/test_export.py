@@ -10,23 +10,12 @@ from hypothesis import given, settings
 from elbow_gym import dynamics, kinematics
 from elbow_gym.export import mjcf, urdf
 from tests.support.kernel_calls import accelerations_of
+from tests.support.mujoco_models import loaded_in_mujoco
 from tests.support.strategies import cases
 
 
 def difference(value, expected):
     return np.abs(value - expected).max() / max(1.0, np.abs(expected).max())
-
-
-def loaded_in_mujoco(arm):
-    mujoco = pytest.importorskip("mujoco")
-    try:
-        model = mujoco.MjModel.from_xml_string(mjcf(arm))
-    except ValueError as error:
-        if "dcmotor" in str(error):
-            pytest.skip("this MuJoCo knows no <dcmotor>")
-        raise
-    model.actuator_actearly[:] = 0
-    return mujoco, model, mujoco.MjData(model)
 
 
 def loaded_in_pinocchio(arm):
@@ -43,7 +32,7 @@ def loaded_in_pinocchio(arm):
 @settings(max_examples=50)
 def test_mujoco_has_the_accelerations_and_current_rates_of_the_file(case):
     arm, q, q_dot, current, voltage, _ = case
-    mujoco, model, data = loaded_in_mujoco(arm)
+    mujoco, model, data = loaded_in_mujoco(mjcf(arm))
     data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = q, q_dot, current, voltage
     mujoco.mj_forward(model, data)
     for q_ddot, _, current_dot in (
@@ -71,7 +60,7 @@ def test_pinocchio_has_the_accelerations_of_the_file(case):
 
 def test_sites_and_frames_lie_where_the_joints_and_the_hand_do(arm):
     q = np.array(arm.nominal_pose)
-    mujoco, model, data = loaded_in_mujoco(arm)
+    mujoco, model, data = loaded_in_mujoco(mjcf(arm))
     data.qpos[:] = q
     mujoco.mj_forward(model, data)
     names = [*(f"joint{k}" for k in range(3, 11)), "hand"]
