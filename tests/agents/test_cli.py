@@ -1,6 +1,7 @@
 """Commands of a program: the first word chooses one, errors end with a line, and each has its own help."""
 
 import errno
+import json
 import os
 import re
 import signal
@@ -285,6 +286,31 @@ def test_broken_pipe_of_something_else_is_not_hidden(app, capsys):
         app.run(["film"])
 
 
+HEAVY = ("numba", "torch", "scipy", "matplotlib", "stable_baselines3", "rich")
+ASKED = [
+    *((program, *words) for program, names in COMMANDS.items() for words in ([], *([name] for name in names))),
+    ("agents", "train", "ppo"),
+    ("agents", "train", "ppo", "--elbows", "1"),
+]
+"""Words that help is asked for, the program's name first."""
+ASKING = f"""
+import contextlib, io, json, runpy, sys
+from importlib.util import find_spec
+said = []
+for words in {ASKED}:
+    sys.argv = [*words, "--help"]
+    # Boxes are drawn where the encoding has them.
+    out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            runpy.run_path(find_spec(words[0] + ".__main__").origin, run_name="__main__")
+        except SystemExit as end:
+            code = end.code
+    said.append((code, *(text.buffer.getvalue().decode() for text in (out, err))))
+print(json.dumps([said, [name for name in {HEAVY} if name in sys.modules]]))
+"""
+
+
 def said_by(*words):
     environment = {**os.environ, "PYTHONUTF8": "1", "COLUMNS": "80"}
     command = [sys.executable, *words]
@@ -294,17 +320,37 @@ def said_by(*words):
     return ran.stdout
 
 
+@pytest.fixture(scope="module")
+def asked():
+    """What all the helps are, by their words, and the heavy libraries that they loaded; one process says it all."""
+    said, loaded = json.loads(said_by("-c", ASKING))
+    return dict(zip(ASKED, said, strict=True)), loaded
+
+
+@pytest.fixture
+def help_of(asked):
+    """Gives the help of words, the program's name first."""
+
+    def given(*words):
+        code, out, err = asked[0][words]
+        assert (code, err) == (0, "")
+        return out
+
+    return given
+
+
 @pytest.mark.parametrize("program", COMMANDS)
-def test_help_of_a_program_lists_its_commands(program):
-    said = said_by("-m", program, "--help")
+def test_help_of_a_program_lists_its_commands(program, help_of):
+    said = help_of(program)
+    assert said == said_by("-m", program, "--help")
     assert said.startswith(f"usage: python -m {program} ")
     assert re.findall(r"^  (\w+) +\S", said, re.MULTILINE) == list(COMMANDS[program])
     assert max(map(len, said.splitlines())) <= 80
 
 
 @pytest.mark.parametrize(("program", "command"), [(name, one) for name, all_ in COMMANDS.items() for one in all_])
-def test_help_of_a_command_shows_its_own_usage(program, command):
-    said = said_by("-m", program, command, "--help")
+def test_help_of_a_command_shows_its_own_usage(program, command, help_of):
+    said = help_of(program, command)
     assert said.startswith(f"usage: python -m {program} {command} [-h]")
     assert said.count("usage:") == 1
 
@@ -315,30 +361,16 @@ def groups(said):
     return {title: set(re.findall(r"^│ (--[\w-]+)", body, re.MULTILINE)) for title, body in boxes}
 
 
-def test_help_of_an_algorithm_groups_its_options_apart_and_shows_the_defaults_that_apply():
-    found = groups(said := said_by("-m", "agents", "train", "ppo", "--help"))
+def test_help_of_an_algorithm_groups_its_options_apart_and_shows_the_defaults_that_apply(help_of):
+    found = groups(said := help_of("agents", "train", "ppo"))
     assert found["task options"] == {"--env", "--elbows", "--arm", "--environment"}
     assert {"--seeds", "--output", "--label"} <= found["run options"]
     assert {"--total-timesteps", "--gamma", "--clip-range"} <= found["algorithm options"]
     assert "--tau" not in said
-    flat = " ".join(said_by("-m", "agents", "train", "ppo", "--elbows", "1", "--help").replace("│", " ").split())
+    flat = " ".join(help_of("agents", "train", "ppo", "--elbows", "1").replace("│", " ").split())
     assert "summed over all arms. (default: 5000000)" in flat
     assert "summed over all arms. (default: 2500000)" in " ".join(said.replace("│", " ").split())
 
 
-HEAVY = ("numba", "torch", "scipy", "matplotlib", "stable_baselines3", "rich")
-
-
-def test_help_loads_no_compiler_and_no_learning_library():
-    code = f"""
-import contextlib, io, sys
-from agents.__main__ import app as agents
-from benchmarks.__main__ import app as benchmarks
-for app, names in ((agents, {COMMANDS["agents"]}), (benchmarks, {COMMANDS["benchmarks"]})):
-    for words in ([], *([name] for name in names), ["train", "ppo"]):
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            with contextlib.suppress(SystemExit):
-                app.parse([*words, "--help"])
-print([name for name in {HEAVY} if name in sys.modules])
-"""
-    assert said_by("-c", code) == "[]\n"
+def test_help_loads_no_compiler_and_no_learning_library(asked):
+    assert asked[1] == []
