@@ -171,6 +171,21 @@ class HandPlacement:
         return q, q_dot
 
 
+def nearest_turn(q_d: Array, q: Array) -> Array:
+    """The angles q_d [rad], (..., n), with joints 1 and n-1 whole turns on where that is nearer to q [rad], (..., n).
+
+    The hand stays where it is. Along a path `HandPlacement` gives one of these joints another turn where it comes to
+    half a turn from the pose's angle, or joint 1 to the negative x axis; a controller should go on, not back.
+    """
+    far = q - q_d
+    if np.abs(far).max() <= np.pi:
+        return q_d
+    turned = q_d.copy()
+    for joint in (0, -2):
+        turned[..., joint] += 2.0 * np.pi * np.round(far[..., joint] / (2.0 * np.pi))
+    return turned
+
+
 def inverse_kinematics(
     arm: ArmParameters, pose: ArrayLike, position: ArrayLike, velocity: ArrayLike | None = None
 ) -> tuple[Array, Array]:

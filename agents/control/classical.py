@@ -19,7 +19,7 @@ from agents.control.posture import best_postures, leads_to
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
 from elbow_gym.checks import positive
 from elbow_gym.interface import Environment, Interface
-from elbow_gym.kinematics import HandPlacement, on_table
+from elbow_gym.kinematics import HandPlacement, nearest_turn, on_table
 from elbow_gym.parameters import ArmParameters
 from elbow_gym.task.circle import Circle
 
@@ -75,6 +75,7 @@ class Reference:
             self._start = q
         rate = np.asarray(self._interface.target_rate)[..., None]
         q_d, q_d_dot, change = self._desired(angle)
+        q_d = nearest_turn(q_d, q)
         q_d_ddot = change * (rate / (2.0 * ANGLE_STEP))
         blend, slope, curvature = minimum_jerk(self._calls * self._interface.control_period / self._reach_time)
         slope, curvature = slope / self._reach_time, curvature / self._reach_time**2

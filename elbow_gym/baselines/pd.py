@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from elbow_gym.checks import positive
 from elbow_gym.interface import Environment, Interface
-from elbow_gym.kinematics import HandPlacement
+from elbow_gym.kinematics import HandPlacement, nearest_turn
 
 PAPER_KP = 500.0
 PAPER_KD = 20.0
@@ -25,8 +25,9 @@ CLIPPED: dict[str, Any] = {"control_frequency": 2000.0, "voltage_limit": 24.0, "
 class PDController:
     """v = kp (q_d - q) + kd (q_d_dot - q_dot) on every joint (eq. 27), in volts, then in the action's unit.
 
-    q_d keeps the start pose but for joints 1, n-1 and n, which put the hand on the target (eq. 29); q_d_dot is its
-    exact derivative. The control is stable at 2 kHz, as with the environment's arguments `CLIPPED`, not at 1 kHz.
+    q_d keeps the start pose but for joints 1, n-1 and n, which put the hand on the target (eq. 29), joints 1 and n-1 by
+    the turn nearest to where they are; q_d_dot is its exact derivative. On the paper's arm the control is stable at
+    2 kHz, as with the environment's arguments `CLIPPED`, not at 1 kHz.
 
     Args:
         env: the environment that it will act in, single or batched, wrapped or not.
@@ -60,5 +61,6 @@ class PDController:
         interface = self._interface
         observed = interface.decode(observation)
         q_d, q_d_dot = self.desired(interface.target_angle(observed))
+        q_d = nearest_turn(q_d, interface.pose + observed["joint_angle"])
         lag = q_d - interface.pose - observed["joint_angle"]
         return interface.action(self.kp * lag + self.kd * (q_d_dot - observed["joint_velocity"])), None

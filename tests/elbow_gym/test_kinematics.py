@@ -131,3 +131,13 @@ def test_an_unreachable_target_says_by_how_much(arm, last_length, height, missin
     rho, z = 0.3 * (2.0 + 5.0 * np.sqrt(0.5)), 0.3 * np.sqrt(0.5)
     with pytest.raises(ValueError, match=rf"within reach of the last two links, got a point {missing} m outside it"):
         kinematics.inverse_kinematics(arm, arm.nominal_pose, [rho, 0.0, z + height])
+
+
+def test_nearest_turn_moves_joints_1_and_n_minus_1_alone_and_by_whole_turns():
+    q_d = np.array([[-3.1, 0.2, 9.0, 0.0], [1.0, 0.2, 3.1, 0.0]])
+    q = np.array([[3.1, 7.0, -3.1, 7.0], [2.0, 7.0, -3.1, 7.0]])
+    turned = kinematics.nearest_turn(q_d, q)
+    turn = 2.0 * np.pi
+    np.testing.assert_allclose(turned, [[turn - 3.1, 0.2, 9.0 - 2.0 * turn, 0.0], [1.0, 0.2, 3.1 - turn, 0.0]])
+    near = q_d + 3.0
+    assert kinematics.nearest_turn(q_d, near) is q_d

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elbow_gym.baselines.pd import PDController
+from elbow_gym.baselines.pd import CLIPPED, PDController
 from elbow_gym.kinematics import hand_position
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -66,3 +66,18 @@ def test_circle_out_of_the_last_links_reach_is_refused_with_the_distance():
 def test_gains_must_be_positive(gain):
     with pytest.raises(ValueError, match=rf"{gain} must be positive, got -1\.0"):
         PDController(volts_env(), **{gain: -1.0})
+
+
+def test_the_pd_goes_on_where_the_target_crosses_the_half_turn_of_joint_1():
+    circle = {"center": [-1.5 * np.sqrt(2.0), 0.0, 0.4], "phase": -0.05}
+    env = ElbowArmVectorEnv(1, **CLIPPED, circle=circle, start="on_target", start_noise=0.0)
+    observation, _ = env.reset(seed=0)
+    pd = PDController(env)
+    desired = [pd.desired(env.episodes.angle())[0][0, 0]]
+    for _ in range(200):
+        observation, *_, info = env.step(pd.predict(observation)[0])
+        desired.append(pd.desired(env.episodes.angle())[0][0, 0])
+    # The angle itself jumps by a turn there, since it is an arc tangent.
+    assert np.abs(np.diff(desired)).max() > 6.0
+    assert info["tracking_error"][0] < 0.02
+    assert info["electrical_energy"][0] < 20.0
