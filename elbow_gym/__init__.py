@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from elbow_gym.baselines.policy import load_policy
     from elbow_gym.env import ElbowArmEnv
     from elbow_gym.interface import Interface
+    from elbow_gym.motor_presets import motor
     from elbow_gym.multi_objective import MOElbowArmEnv, MOElbowArmVectorEnv
     from elbow_gym.parameters import ArmParameters, LinkParameters, MotorParameters, paper_arm
     from elbow_gym.simulation.options import Conditions
@@ -38,6 +39,7 @@ _HOMES = {
     "Simulator": "simulator",
     "TableParameters": "table",
     "load_policy": "baselines.policy",
+    "motor": "motor_presets",
     "paper_arm": "parameters",
 }
 
@@ -56,6 +58,7 @@ __all__ = [
     "Simulator",
     "TableParameters",
     "load_policy",
+    "motor",
     "paper_arm",
 ]
 

@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 
 from elbow_gym.checks import check_entries, finite, non_negative, positive, require_entries
 from elbow_gym.motor_parameters import MotorParameters
+from elbow_gym.motor_presets import motor
 
 Array = NDArray[np.float64]
 
 MINIMUM_JOINTS = 3
 MAXIMUM_JOINTS = 64
+PRESET = "preset"
+"""Entry of a motor's dict that names one of `motor_presets.MOTORS`."""
 
 
 def _set(instance: object, name: str, value: object) -> None:
@@ -127,15 +130,18 @@ class ArmParameters:
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> ArmParameters:
-        """Arm from a dict of `to_dict`. Raises ValueError naming an unknown, missing or wrong entry."""
+        """Arm from a dict of `to_dict`, whose motors may also be presets.
+
+        A motor is then the name of one of `motor_presets.MOTORS`, or a dict of that name under "preset" and of fields
+        that no sheet has, such as {"preset": "maxon-re40-150w-24v", "gear_ratio": 20.0}. Raises ValueError naming an
+        unknown, missing or wrong entry.
+        """
         allowed = {field.name for field in fields(cls)}
         check_entries(plain, allowed, "arm")
         require_entries(plain, sorted(allowed - {"gravity"}), "arm")
         values = dict(plain)
         values["links"] = tuple(_part(LinkParameters, part, "links") for part in _sequence("links", plain["links"]))
-        values["motors"] = tuple(
-            _part(MotorParameters, part, "motors") for part in _sequence("motors", plain["motors"])
-        )
+        values["motors"] = tuple(_motor(part) for part in _sequence("motors", plain["motors"]))
         for name in ("joint_viscous_friction", "nominal_pose"):
             values[name] = tuple(_sequence(name, plain[name]))
         return cls(**values)
@@ -153,6 +159,15 @@ def _part(kind: type[Any], plain: object, owner: str) -> Any:
     mapping = cast("Mapping[str, Any]", plain)
     check_entries(mapping, {field.name for field in fields(kind)}, owner)
     return kind(**mapping)
+
+
+def _motor(plain: object) -> MotorParameters:
+    if isinstance(plain, str):
+        return motor(plain)
+    mapping = cast("Mapping[str, Any]", plain if isinstance(plain, Mapping) else {})
+    if PRESET in mapping:
+        return motor(mapping[PRESET], **{name: value for name, value in mapping.items() if name != PRESET})
+    return _part(MotorParameters, plain, "motors")
 
 
 def paper_arm() -> ArmParameters:
