@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal
@@ -9,7 +10,7 @@ from typing import Annotated, Literal
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from agents.cli import Commands, Count, JsonObject, Seed
-from agents.task_options import TaskOptions
+from agents.task_options import Elbows, TaskOptions
 
 TASK = TaskOptions()
 app = Commands("python -m agents", "Controllers of the arm: training, evaluation, pictures, the paper's results.")
@@ -18,23 +19,38 @@ NOTHING: dict[str, object] = {}
 
 
 @app.command
-def reproduce(output: Path = Path("reproduction"), publish: bool = False, table: bool = False) -> None:
-    """The paper's three cases: Figs 1-25, the series, the numbers and a verdict on each of its claims.
+def reproduce(
+    elbows: Elbows = 2,
+    arm: Path | None = None,
+    output: Path = Path("reproduction"),
+    publish: bool = False,
+    table: bool = False,
+) -> None:
+    """The paper's cases: Figs 1-25, the series, the numbers and a verdict on each of its claims, on any arm.
 
     Args:
+        elbows: Elbows of the case that has most, 1 or 2 as in the paper or the joints' numbers, such as 4 or 4,7; each
+            further case has one less, the outermost.
+        arm: JSON file of another arm, as `ArmParameters.to_dict` has it. Its circle is one in its reach, and nothing is
+            compared with the paper's numbers.
         output: Folder for figures, CSV files and the verdict.
         publish: Whether to refresh the pictures of the READMEs and the committed numbers too.
-        table: Whether to play on a compliant table instead, which cannot pull, from three start poses under three
+        table: Whether to play on a compliant table instead, which cannot pull, from start poses under three
             frictions, with a verdict on whether leaning saves energy.
     """
+    from agents.paper.subject import Subject
+
+    subject = Subject(2 if elbows is None else elbows, arm)
+    if arm is not None:
+        print(subject.described(), file=sys.stderr)
     if table:
         from agents.paper.table_claims import reproduce_on_table
 
-        reproduce_on_table(output, publish=publish)
+        reproduce_on_table(output, publish=publish, subject=subject)
         return
     from agents.paper.cases import reproduce as reproduce_paper
 
-    reproduce_paper(output, publish=publish)
+    reproduce_paper(output, publish=publish, subject=subject)
 
 
 @app.command_from

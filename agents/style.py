@@ -81,6 +81,11 @@ def elbow_name(elbows: int) -> str:
     return ELBOW_NAMES.get(elbows, f"{elbows} elbows")
 
 
+def elbow_colour(elbows: int) -> str:
+    """Colour of a number of elbows, #rrggbb; a spare one beyond two."""
+    return ELBOW_COLOURS.get(elbows, SPARE_COLOURS[(elbows - 3) % len(SPARE_COLOURS)])
+
+
 def pyplot() -> Any:
     """Matplotlib's pyplot on the file backend, with the project's defaults."""
     import matplotlib as mpl

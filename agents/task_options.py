@@ -14,6 +14,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 from agents.cli import JsonObject
 
 if TYPE_CHECKING:
+    from elbow_gym.task.circle import Circle
     from elbow_gym.task.settings import Settings
 
 
@@ -95,6 +96,10 @@ class TaskOptions:
         """Says on stderr which circle an arm of the user's own follows."""
         if self.arm is None:
             return
-        circle = settings.parsed_circle.widest
-        center = ", ".join(f"{value:.4g}" for value in circle.center)
-        print(f"{self.arm}: circle of {circle.radius:.4g} m around ({center}) m", file=sys.stderr)
+        print(f"{self.arm}: {circle_in_words(settings.parsed_circle.widest)}", file=sys.stderr)
+
+
+def circle_in_words(circle: Circle) -> str:
+    """Radius and centre of a circle that is not drawn."""
+    center = ", ".join(f"{value:.4g}" for value in circle.center)
+    return f"circle of {circle.radius:.4g} m around ({center}) m"

@@ -1,24 +1,25 @@
-"""Runs of the paper's three cases: figures, numbers and a verdict on its claims."""
+"""Runs of the paper's cases, on its arm or another: figures, numbers and a verdict on its claims."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from agents.evaluation.metrics import joint_energies, metrics
 from agents.evaluation.recording import Recording, record, thinned
-from agents.files import check_writable, write_csv, write_text, write_whole
+from agents.files import check_writable, write_text, write_whole
 from agents.paper.claims import Claim, Numbers, as_markdown, verdict
-from agents.paper.figures import CASES, SETTLED, draw, write_series
-from agents.style import ELBOW_NAMES
+from agents.paper.figures import SETTLED, draw, write_series
+from agents.paper.numbers import PUBLISHED_CASES, numbers_table, write_numbers
+from agents.paper.subject import Subject
+from agents.tasks import Elbows
 from agents.workers import Job, in_processes
 from elbow_gym.baselines.pd import CLIPPED, UNLIMITED, PDController
-from elbow_gym.parameters import as_elbows
 from elbow_gym.task.settings import Settings
 
 RESULTS = Path(__file__).parent / "results"
@@ -35,30 +36,6 @@ RUNS: dict[str, dict[str, Any]] = {
     "24 V": {**CLIPPED, "start": "paper"},
 }
 """Arguments of the environment, but for the elbows and what all share, of the runs behind one case."""
-
-EXPECTED: dict[str, tuple[Any, Any, Any]] = {
-    "energy": (7660.0, 8726.0, 10866.0),
-    "energy_tracking": (51.7, 625.5, 1770.0),
-    "link_work": (4.75, 4.51, 4.03),
-    "error_rms": (12.6, 86.2, 198.2),
-    "z_rms": (12.0, 85.1, 196.6),
-    "energy_on_target": (96.2, 1097.0, 3139.0),
-    "energy_clipped": (806.0, 1825.0, 3852.0),
-    "force_mean": ((-1.3, None), (None,), ()),
-    "force_smallest": ((-7.9, None), (None,), ()),
-    "joint_energy": (
-        (7491.0, 3.0, 11.8, 6.6, 1.9, 15.8, 94.5, 25.0, 6.9, 3.7),
-        (7490.0, 19.5, 77.8, 582.0, 307.0, 126.0, 89.0, 24.7, 6.5, 3.7),
-        (7487.0, 1372.0, 850.0, 590.0, 313.0, 129.0, 89.0, 25.0, 6.4, 3.7),
-    ),
-}
-"""Published reference for two, one and no elbow by field of `Numbers`: the PD continuous inside RK4 at 1e-4 s.
-
-Rounded as published. Here each voltage is held for 1e-4 s, which makes the start of joint 1 cost 0.2 % more.
-"""
-
-UNITS = {"error_rms": "mm", "z_rms": "mm", "z_mean": "mm", "force_mean": "N", "force_smallest": "N", "below_table": "s"}
-"""Units of the fields of `Numbers`; J where none is given."""
 
 
 @dataclass(frozen=True)
@@ -78,45 +55,64 @@ class Played:
     series: Recording
 
 
-def reproduce(output: Path = Path("reproduction"), publish: bool = False) -> Reproduction:
+def reproduce(
+    output: Path = Path("reproduction"), publish: bool = False, subject: Subject | None = None
+) -> Reproduction:
     """Runs the paper's cases, prints their numbers and the verdict, and writes everything under `output`.
 
     Args:
-        output: folder for fig01.png to fig25.png, paper_cases.png, series.csv, numbers.csv and verdict.md.
+        output: folder for fig01.png to fig25.png, paper_cases.png, series.csv, numbers.csv and verdict.md; an arm of n
+            joints has 5 + 2 n figures.
         publish: also refresh the README's picture and the numbers in agents/paper/results.
+        subject: arm and elbows; the paper's when None.
+
+    Raises:
+        ValueError: results of another arm or other elbows than the paper's would be published, or the arm cannot lie
+            on its elbows or follow a circle.
     """
     from rich.console import Console
     from rich.markdown import Markdown
     from tqdm import tqdm
 
+    subject = subject or Subject()
+    check_publishable(publish, subject)
     check_writable(output)
-    jobs = {(elbows, name): settings_of(elbows, name) for elbows in CASES for name in RUNS}
-    n_figures = 6 + 2 * jobs[2, "paper"].parsed_arm.n_joints
+    cases = subject.cases
+    jobs = {(elbows, name): settings_of(elbows, name, subject=subject) for elbows in cases for name in RUNS}
+    n_figures = 6 + 2 * subject.arm.n_joints
     total = sum(settings.horizon for settings in jobs.values()) + FIGURE_PERIODS * n_figures
     layout = "{desc} {percentage:3.0f}%|{bar}| {elapsed} elapsed, {remaining} left"
     with tqdm(total=total, desc="simulating", bar_format=layout) as bar:
         played = play_all(jobs, bar.update)
-        numbers = {elbows: case_numbers({name: played[elbows, name].values for name in RUNS}) for elbows in CASES}
-        series = {elbows: played[elbows, "paper"].series for elbows in CASES}
+        numbers = {elbows: case_numbers({name: played[elbows, name].values for name in RUNS}) for elbows in cases}
+        series = {elbows: played[elbows, "paper"].series for elbows in cases}
         bar.set_description("drawing")
         draw(series, output, lambda: bar.update(FIGURE_PERIODS))
     write_series(output / "series.csv", series)
-    write_numbers(output / "numbers.csv", numbers)
-    text = as_markdown(numbers)
+    write_numbers(output / "numbers.csv", numbers, subject.published)
+    text = as_markdown(numbers, None if subject.published else subject.described())
     write_text(output / "verdict.md", text)
     if publish:
         overview = (output / "paper_cases.png").read_bytes()
         write_whole(RESULTS / "paper_cases.png", lambda temporary: temporary.write_bytes(overview))
         write_numbers(RESULTS / "paper_numbers.csv", numbers)
     console = Console()
-    console.print(numbers_table(numbers))
+    console.print(numbers_table(numbers, subject.published))
     console.print(Markdown(text))
+    console.print(f"Wrote {n_figures} figures, series.csv, numbers.csv and verdict.md to {output}")
     return Reproduction(numbers, verdict(numbers), output)
 
 
-def settings_of(elbows: int, name: str, **changes: Any) -> Settings:
-    """The environment of one of `RUNS`."""
-    return Settings(**{"elbows": elbows, "start_noise": 0.0, **RUNS[name], **changes})
+def check_publishable(publish: bool, subject: Subject) -> None:
+    """Raises ValueError where results of another arm or other elbows than the paper's would be published."""
+    if publish and not (subject.published and subject.cases == PUBLISHED_CASES):
+        raise ValueError(f"--publish must be given for the paper's arm on two elbows alone, got {subject.described()}")
+
+
+def settings_of(elbows: Elbows, name: str, subject: Subject | None = None, **changes: Any) -> Settings:
+    """The environment of one of `RUNS`, for one of the cases of a subject, the paper's arm when None."""
+    chosen = {"elbows": elbows} if subject is None else subject.arguments(elbows)
+    return Settings(**{**chosen, "start_noise": 0.0, **RUNS[name], **changes})
 
 
 def play(settings: Settings, progress: Callable[[int], Any] | None = None) -> Played:
@@ -164,86 +160,3 @@ def case_numbers(runs: Mapping[str, Mapping[str, Any]]) -> Numbers:
 def play_all(jobs: Mapping[Any, Settings], progress: Callable[[int], Any]) -> dict[Any, Played]:
     """Results of `play` for every job, each in its own process."""
     return in_processes({key: Job(partial(play, jobs[key]), jobs[key].horizon) for key in jobs}, progress)
-
-
-class Quantity(NamedTuple):
-    """A number of one case beside the published one; None where there is none."""
-
-    name: str
-    unit: str
-    value: float | None
-    expected: float | None
-
-    @property
-    def difference(self) -> float | None:
-        """Difference from the published value, relative to it [-]."""
-        if self.value is None or self.expected is None:
-            return None
-        return self.value / self.expected - 1.0
-
-
-def quantities(elbows: int, numbers: Numbers) -> list[Quantity]:
-    """Every number of a case, the same list for every case."""
-    listed = []
-    for name, value in asdict(numbers).items():
-        if name == "elbow_joints":
-            continue
-        unit = UNITS.get(name, "J")
-        expected = EXPECTED[name][CASES.index(elbows)] if name in EXPECTED else None
-        if not isinstance(value, tuple):
-            listed.append(Quantity(name, unit, value, expected))
-            continue
-        joints = range(1, len(value) + 1) if name == "joint_energy" else numbers.elbow_joints
-        found = dict(zip(joints, zip(value, expected, strict=True), strict=True))
-        everywhere = joints if name == "joint_energy" else as_elbows(2, 10)
-        listed += [Quantity(f"{name}_{joint}", unit, *found.get(joint, (None, None))) for joint in everywhere]
-    return listed
-
-
-def write_numbers(path: Path, cases: Mapping[int, Numbers]) -> Path:
-    """Writes a CSV row per case: every quantity, its published value and the relative difference, empty where none."""
-    table = {elbows: quantities(elbows, numbers) for elbows, numbers in cases.items()}
-    published = {quantity.name for listed in table.values() for quantity in listed if quantity.expected is not None}
-    header = ["elbows"]
-    for quantity in table[2]:
-        header.append(f"{quantity.name} [{quantity.unit}]")
-        if quantity.name in published:
-            header += [f"{quantity.name} published [{quantity.unit}]", f"{quantity.name} relative difference"]
-    rows = []
-    for elbows, listed in table.items():
-        row: list[Any] = [elbows]
-        for quantity in listed:
-            row.append("" if quantity.value is None else f"{quantity.value:.6g}")
-            if quantity.name in published:
-                row.append("" if quantity.expected is None else f"{quantity.expected:g}")
-                row.append("" if quantity.difference is None else f"{quantity.difference:.5f}")
-        rows.append(row)
-    return write_csv(path, header, rows)
-
-
-def numbers_table(cases: Mapping[int, Numbers]) -> Any:
-    """The numbers as a table for the terminal, each with its difference from the published one."""
-    from rich.box import SIMPLE
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(
-        title="The paper's cases",
-        box=SIMPLE,
-        caption="Tracking, errors and mean forces: t > 2 s. In brackets: relative to the published number.",
-    )
-    table.add_column("", no_wrap=True)
-    for elbows in cases:
-        table.add_column(ELBOW_NAMES[elbows], justify="right", no_wrap=True)
-    for row in zip(*(quantities(elbows, numbers) for elbows, numbers in cases.items()), strict=True):
-        table.add_row(
-            escape(f"{row[0].name} [{row[0].unit}]".replace("_", " ")), *(_cell(quantity) for quantity in row)
-        )
-    return table
-
-
-def _cell(quantity: Quantity) -> str:
-    if quantity.value is None:
-        return ""
-    value = f"{quantity.value:.5g}"
-    return value if quantity.difference is None else f"{value} ({quantity.difference:+.1%})"

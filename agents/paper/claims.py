@@ -6,8 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
+from agents.paper.subject import cases_in_words
+from agents.style import elbow_name
+
 # The paper calls the three curves of link work "the same"; within a quarter they count as alike, beyond it they do not.
 ALIKE = 1.25
+NUMBER_WORDS = {2: "two", 3: "three", 4: "four"}
+"""Numbers of cases in words."""
+OTHER_ARM = (
+    "All five statements are the paper's about its own arm on joints 4 and 7, driven by gains for that arm's motors. "
+    "Here the same PD with the same gains drives another arm or leans on other joints, so that a verdict says nothing "
+    "for or against the paper. The paper's published numbers hold for its arm alone and are left out."
+)
+"""What a verdict on another arm says before the statements."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,21 +68,21 @@ class Claim:
 
 
 Cases = Mapping[int, Numbers]
-"""Numbers by elbow count: 2, 1 and 0."""
+"""Numbers by elbow count, largest first, down to 0."""
 
 
 def verdict(cases: Cases) -> list[Claim]:
-    """The paper's five claims, judged by the numbers of its three cases alone."""
+    """The paper's five claims, judged by the numbers of its cases alone."""
     return [_tracking(cases), _height(cases), _work(cases), _toward_the_base(cases), _energy(cases)]
 
 
 def _falls_with_elbows(values: Mapping[int, float]) -> bool:
-    return values[2] < values[1] < values[0]
+    return all(values[elbows] < values[elbows - 1] for elbows in range(1, len(values)))
 
 
-def _three(values: Mapping[int, float], unit: str) -> str:
-    """Values for two, one and no elbow, in this order throughout."""
-    return " / ".join(_short(values[elbows]) for elbows in (2, 1, 0)) + f" {unit}"
+def _each(values: Mapping[int, float], unit: str) -> str:
+    """Values of the cases, most elbows first throughout."""
+    return " / ".join(_short(values[elbows]) for elbows in sorted(values, reverse=True)) + f" {unit}"
 
 
 def _short(value: float) -> str:
@@ -84,7 +95,7 @@ def _tracking(cases: Cases) -> Claim:
         "tracking",
         "The more elbows, the more exactly the hand follows the circle.",
         _falls_with_elbows(errors),
-        f"hand error rms for t > 2 s: {_three(errors, 'mm')}",
+        f"hand error rms for t > 2 s: {_each(errors, 'mm')}",
     )
 
 
@@ -92,13 +103,13 @@ def _height(cases: Cases) -> Claim:
     heights = {elbows: numbers.z_rms for elbows, numbers in cases.items()}
     free = cases[0]
     share = (free.z_rms / free.error_rms) ** 2
-    worst = heights[0] > max(heights[1], heights[2])
+    worst = all(heights[0] > height for elbows, height in heights.items() if elbows)
     side = "under" if free.z_mean < 0.0 else "over"
     return Claim(
         "height",
         "Along z, where gravity acts, the arm without elbows is worst: it sags, and the hand with it.",
         worst and share > 0.5 and free.z_mean < 0.0,
-        f"z error rms for t > 2 s: {_three(heights, 'mm')}; without elbows z makes {share:.1%} of the squared error "
+        f"z error rms for t > 2 s: {_each(heights, 'mm')}; without elbows z makes {share:.1%} of the squared error "
         f"and the hand is on average {_short(abs(free.z_mean))} mm {side} the target",
     )
 
@@ -116,18 +127,20 @@ def _work(cases: Cases) -> Claim:
     apart = all(ratio(values) > ALIKE and values[0] == max(values.values()) for values in (energy, late_energy))
     return Claim(
         "work and energy",
-        "The work that the links do is alike in the three cases, the electrical energy is not: "
-        "it is greatest without elbows.",
+        f"The work that the links do is alike in the {NUMBER_WORDS.get(len(cases), len(cases))} cases, the electrical "
+        "energy is not: it is greatest without elbows.",
         alike and apart,
-        f"link work {_three(work, 'J')} (largest over smallest {ratio(work):.3g}; alike up to {ALIKE}), for t > 2 s "
-        f"{_three(late_work, 'J')} ({ratio(late_work):.3g}); energy {_three(energy, 'J')} "
-        f"({ratio(energy):.3g}), for t > 2 s {_three(late_energy, 'J')} ({ratio(late_energy):.3g})",
+        f"link work {_each(work, 'J')} (largest over smallest {ratio(work):.3g}; alike up to {ALIKE}), for t > 2 s "
+        f"{_each(late_work, 'J')} ({ratio(late_work):.3g}); energy {_each(energy, 'J')} "
+        f"({ratio(energy):.3g}), for t > 2 s {_each(late_energy, 'J')} ({ratio(late_energy):.3g})",
     )
 
 
 def _toward_the_base(cases: Cases) -> Claim:
     evidence, holds = [], True
-    for fewer, more in ((0, 1), (1, 2), (0, 2)):
+    most = max(cases)
+    pairs = [(elbows, elbows + 1) for elbows in range(most)]
+    for fewer, more in pairs if most == 1 else [*pairs, (0, most)]:
         relieved, already = cases[more].elbow_joints[-1], (1, *cases[fewer].elbow_joints)[-1]
         # An elbow cannot relieve joints that another one before it relieves already; joint 1 has a vertical axis.
         joints = range(max(2, already), relieved)
@@ -135,15 +148,15 @@ def _toward_the_base(cases: Cases) -> Claim:
         holds = holds and gaps[-1] > 0.0 and all(inner > outer for inner, outer in pairwise(gaps))
         listed = ", ".join(_short(gap) for gap in gaps)
         evidence.append(f"{fewer} against {more}, joints {joints[0]} to {joints[-1]}: {listed} J")
-    yaw = cases[0].joint_energy[0] - cases[2].joint_energy[0]
-    outer = cases[2].elbow_joints[-1]
-    rest = sum(cases[0].joint_energy[outer - 1 :]) - sum(cases[2].joint_energy[outer - 1 :])
+    yaw = cases[0].joint_energy[0] - cases[most].joint_energy[0]
+    outer = cases[most].elbow_joints[-1]
+    rest = sum(cases[0].joint_energy[outer - 1 :]) - sum(cases[most].joint_energy[outer - 1 :])
     return Claim(
         "toward the base",
         "Of the joints before an elbow, those nearer to the base save more energy by it. "
         "Joint 1 is excepted: its axis is vertical, so gravity does not load it.",
         holds,
-        f"energy saved by elbows, {'; '.join(evidence)}. For comparison, 0 against 2: joint 1 {yaw:.3g} J, "
+        f"energy saved by elbows, {'; '.join(evidence)}. For comparison, 0 against {most}: joint 1 {yaw:.3g} J, "
         f"joints {outer} to {len(cases[0].joint_energy)} together {rest:.3g} J",
     )
 
@@ -162,10 +175,10 @@ def _energy(cases: Cases) -> Claim:
         "So an arm on its elbows does the task with less energy, however the run is counted.",
         all(_falls_with_elbows(values) for values in readings.values()),
         "; ".join(
-            f"{name} {_three(values, 'J')}" + ("" if _falls_with_elbows(values) else " (does not fall with elbows)")
+            f"{name} {_each(values, 'J')}" + ("" if _falls_with_elbows(values) else " (does not fall with elbows)")
             for name, values in readings.items()
         )
-        + f". Joint 1's first second alone is {_three(shares, '%')} of the whole run's energy and differs by at most "
+        + f". Joint 1's first second alone is {_each(shares, '%')} of the whole run's energy and differs by at most "
         f"{_short(max(first.values()) - min(first.values()))} J between the cases; hence the other readings",
     )
 
@@ -173,10 +186,10 @@ def _energy(cases: Cases) -> Claim:
 def disclosures(cases: Cases) -> list[str]:
     """Facts that qualify the paper's conclusions, from the same numbers."""
     notes = []
-    for elbows in (2, 1):
+    for elbows in sorted(set(cases) - {0}, reverse=True):
         numbers = cases[elbows]
         for joint, mean, smallest in zip(numbers.elbow_joints, numbers.force_mean, numbers.force_smallest, strict=True):
-            name = f"joint {joint} with {'two elbows' if elbows == 2 else 'one elbow'}"
+            name = f"joint {joint} with {elbow_name(elbows)}"
             forces = f"mean {mean:.3g} N for t > 2 s, smallest {smallest:.3g} N over the run"
             if mean < 0.0:
                 notes.append(f"The table pulls on {name} on average: {forces}.")
@@ -189,23 +202,29 @@ def disclosures(cases: Cases) -> list[str]:
     below = {elbows: numbers.below_table for elbows, numbers in cases.items()}
     if max(below.values()) > 0.0:
         notes.append(
-            f"Joints sink under the table's height for {_three(below, 's')} of the run: where the paper has no "
+            f"Joints sink under the table's height for {_each(below, 's')} of the run: where the paper has no "
             "elbow it has no table either."
         )
     return notes
 
 
-def as_markdown(cases: Cases) -> str:
-    """The claims and disclosures as a Markdown document."""
-    lines = [
-        "# Does the paper hold?",
-        "",
-        "Three values stand for two / one / no elbow. Every verdict is computed from the run.",
-        "",
-    ]
+def as_markdown(cases: Cases, other: str | None = None) -> str:
+    """The claims and disclosures as a Markdown document.
+
+    Args:
+        cases: the numbers that decide.
+        other: description of the arm where it is not the paper's on the paper's elbows.
+    """
+    number = NUMBER_WORDS.get(len(cases), str(len(cases))).capitalize()
+    legend = f"{number} values stand for {cases_in_words(list(cases))}. Every verdict is computed from the run."
+    if other is None:
+        lines, fails = ["# Does the paper hold?", "", legend, ""], "FAILS"
+    else:
+        title = "# Do the paper's statements hold on another arm?"
+        lines, fails = [title, "", f"Arm: {other}.", "", OTHER_ARM, "", legend, ""], "Does not hold here"
     for number, claim in enumerate(verdict(cases), start=1):
         lines += [
-            f"{number}. **{'Holds' if claim.holds else 'FAILS'}** ({claim.name}). {claim.statement}",
+            f"{number}. **{'Holds' if claim.holds else fails}** ({claim.name}). {claim.statement}",
             "",
             f"   Evidence: {claim.evidence}.",
             "",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,9 @@ from agents.evaluation.metrics import metrics
 from agents.evaluation.recording import Array, Recording, instant
 from agents.paper.cases import RECORD_PERIOD
 from agents.paper.figures import SETTLED
+from agents.paper.subject import Subject, listed
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
-from elbow_gym.kinematics import hand_position, inverse_kinematics, joint_positions
+from elbow_gym.kinematics import hand_position, inverse_kinematics, nearest_turn, radii
 from elbow_gym.parameters import ArmParameters
 from elbow_gym.simulation.options import Conditions
 from elbow_gym.simulator import Simulator
@@ -22,16 +23,24 @@ from elbow_gym.task.settings import Settings
 FRICTIONS = (0.0, 0.1, 0.3)
 """Coulomb's coefficient of the table [-]."""
 
-LIFTS: dict[str, tuple[float, float]] = {
-    "joints 4 and 7": (0.0, 0.0),
-    "joint 4": (0.0, 0.1),
-    "clear": (0.1, 0.2),
-}
-"""Heights of joints 4 and 7 in the start pose [m] by what then touches the table.
+LIFT = 1.0 / 3.0
+"""Height by which a joint that does not lean is above the one before it, over the mean length of the links [-].
 
-The PD has no gravity compensation: as the arm swings over at the start, joint 7 sags by 0.07 m where joint 4 leans and
-by up to 0.2 m where nothing does.
+The PD has no gravity compensation: as the paper's arm, whose links are 0.3 m long, swings over at the start, joint 7
+sags by 0.07 m where joint 4 leans and by up to 0.2 m where nothing does.
 """
+CLEAR = "clear"
+"""Name of the start from which nothing leans on the table."""
+
+
+def lifts(subject: Subject) -> dict[str, tuple[float, ...]]:
+    """Heights of the elbows in the start poses [m], by what then touches the table, most joints first."""
+    joints, lift = subject.elbow_joints, LIFT * float(subject.arm.of_links("length")[1:].mean())
+    found = {}
+    for leaning in subject.cases:
+        name = listed(joints[:leaning]) if leaning else CLEAR
+        found[name] = tuple(lift * max(0, number - leaning) for number in range(1, len(joints) + 1))
+    return found
 
 
 @dataclass(frozen=True)
@@ -62,35 +71,50 @@ class TableNumbers:
     """Root mean square of the hand's error from t = 2 s on [mm]."""
     z_rms: float
     """Root mean square of the error's vertical part from t = 2 s on [mm]."""
-    force_4_mean: float
-    """Mean force on joint 4 from t = 2 s on [N]."""
-    force_4_smallest: float
-    """Smallest force on joint 4 from t = 2 s on [N]."""
-    force_4_largest: float
-    """Largest force on joint 4 from t = 2 s on [N]."""
-    force_7_mean: float
-    """Mean force on joint 7 from t = 2 s on [N]."""
-    force_7_smallest: float
-    """Smallest force on joint 7 from t = 2 s on [N]."""
-    force_7_largest: float
-    """Largest force on joint 7 from t = 2 s on [N]."""
+    force: Mapping[int, Force]
+    """Force on each joint that may lean, from t = 2 s on [N], by its number."""
     force_elsewhere_largest: float
     """Largest force on any other joint or the hand over the whole run [N], as the arm swings over at the start."""
 
+    @property
+    def columns(self) -> dict[str, float]:
+        """All numbers by name, those of the forces as in force_4_mean."""
+        plain = asdict(self)
+        elsewhere, forces = plain.pop("force_elsewhere_largest"), plain.pop("force")
+        named = {f"force_{joint}_{name}": value for joint, one in forces.items() for name, value in one.items()}
+        return {**plain, **named, "force_elsewhere_largest": elsewhere}
 
-def start_pose(arm: ArmParameters, lift: tuple[float, float]) -> Array:
-    """The nominal pose with joints 4 and 7 at the heights `lift` [m] and the hand where it was [rad], (n,).
 
-    Links 2-3 turn about joint 2 and links 4-6 about joint 4, each as one piece; links 7 and 8 keep their direction, and
-    joints n-1 and n put the hand back. Raises ValueError where they cannot.
+@dataclass(frozen=True)
+class Force:
+    """Force of the table on a joint over a time."""
+
+    mean: float
+    """Mean force [N]."""
+    smallest: float
+    """Smallest force [N]."""
+    largest: float
+    """Largest force [N]."""
+
+
+def start_pose(arm: ArmParameters, elbows: Sequence[int], lift: Sequence[float]) -> Array:
+    """The nominal pose with the elbows at the heights `lift` [m] and the hand where it was [rad], (n,).
+
+    The elbows are on the table in the nominal pose. The links between two of them, or before the first, turn as one
+    piece, and the links after the last keep their direction but for the last two, which put the hand back; where it is
+    out of their reach they keep it too. Raises ValueError where elbows are not far enough apart.
     """
     pose = np.array(arm.nominal_pose)
-    positions = joint_positions(arm, pose)
-    radius = np.hypot(positions[:, 0], positions[:, 1])
-    inner = np.arcsin(lift[0] / radius[3])
-    outer = np.arcsin((lift[1] - lift[0]) / (radius[6] - radius[3]))
-    pose[[1, 3, 6]] += -inner, inner - outer, outer
-    return inverse_kinematics(arm, pose, hand_position(arm, np.array(arm.nominal_pose)))[0]
+    rise, run = np.diff(lift, prepend=0.0), np.diff(radii(arm, pose, elbows), prepend=0.0)
+    if not (np.abs(rise) < np.abs(run)).all():
+        raise ValueError(f"elbows must be {np.abs(rise).max():.3g} m apart to be lifted, got {np.abs(run).min():.3g} m")
+    turn = np.arcsin(rise / run)
+    pose[[1, *(elbow - 1 for elbow in elbows)]] += np.diff(np.append(-turn, 0.0), prepend=0.0)
+    try:
+        return inverse_kinematics(arm, pose, hand_position(arm, np.array(arm.nominal_pose)))[0]
+    # Out of the last two links' reach.
+    except ValueError:
+        return pose
 
 
 def play_on_table(
@@ -127,7 +151,8 @@ def play_on_table(
             kept.append({**_instant(simulator), "voltage": largest})
             largest = np.zeros_like(largest)
         if k < settings.horizon:
-            voltage = PAPER_KP * (q_d[k] - simulator.q) + PAPER_KD * (q_d_dot[k] - simulator.q_dot)
+            wanted = nearest_turn(q_d[k], simulator.q)
+            voltage = PAPER_KP * (wanted - simulator.q) + PAPER_KD * (q_d_dot[k] - simulator.q_dot)
             largest = np.where(np.abs(voltage) > np.abs(largest), voltage, largest)
             simulator.advance(voltage, steps)
             if not simulator.valid.all():
@@ -148,13 +173,13 @@ def _instant(simulator: Simulator) -> dict[str, Array]:
     }
 
 
-def measure_on_table(run: TableRecording) -> list[TableNumbers]:
-    """Numbers of each arm of a run."""
+def measure_on_table(run: TableRecording, elbows: Sequence[int]) -> list[TableNumbers]:
+    """Numbers of each arm of a run, whose joints `elbows` may lean on the table."""
     whole, late = metrics(run), metrics(run, SETTLED)
     settled = np.searchsorted(run.time, SETTLED - 1e-9)
     # The first contact is joint 3's.
-    force = {joint: run.normal_force[settled:, :, joint - 3] for joint in (4, 7)}
-    elsewhere = np.delete(run.normal_force, [4 - 3, 7 - 3], axis=2).max(axis=(0, 2))
+    force = {joint: run.normal_force[settled:, :, joint - 3] for joint in elbows}
+    elsewhere = np.delete(run.normal_force, [joint - 3 for joint in elbows], axis=2).max(axis=(0, 2))
     values = {
         "energy": whole["electrical_energy"],
         "energy_tracking": late["electrical_energy"],
@@ -165,12 +190,13 @@ def measure_on_table(run: TableRecording) -> list[TableNumbers]:
         "z_rms": late["z_rms"],
         "force_elsewhere_largest": elsewhere,
     }
-    for joint, found in force.items():
-        values |= {
-            f"force_{joint}_mean": found.mean(axis=0),
-            f"force_{joint}_smallest": found.min(axis=0),
-            f"force_{joint}_largest": found.max(axis=0),
-        }
     return [
-        TableNumbers(**{name: float(value[arm]) for name, value in values.items()}) for arm in range(len(run.seeds))
+        TableNumbers(
+            force={
+                joint: Force(*(float(of(found[:, arm])) for of in (np.mean, np.min, np.max)))
+                for joint, found in force.items()
+            },
+            **{name: float(value[arm]) for name, value in values.items()},
+        )
+        for arm in range(len(run.seeds))
     ]

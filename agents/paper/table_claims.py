@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from agents.files import check_writable, write_csv, write_text, write_whole
-from agents.paper.cases import RESULTS, settings_of
-from agents.paper.claims import Claim
+from agents.paper.cases import RESULTS, check_publishable, settings_of
+from agents.paper.claims import NUMBER_WORDS, Claim
+from agents.paper.subject import Subject
 from agents.paper.table_cases import (
+    CLEAR,
     FRICTIONS,
-    LIFTS,
     TableNumbers,
     TableRecording,
+    lifts,
     measure_on_table,
     play_on_table,
     start_pose,
@@ -22,7 +25,7 @@ from agents.paper.table_cases import (
 from agents.paper.table_figure import table_figure
 
 Cases = Mapping[float, Mapping[str, TableNumbers]]
-"""Numbers by friction, then by start, one of `LIFTS`."""
+"""Numbers by friction, then by start, one of `table_cases.lifts`, most leaning joints first."""
 
 
 @dataclass(frozen=True)
@@ -34,30 +37,43 @@ class TableReproduction:
     output: Path
 
 
-def reproduce_on_table(output: Path = Path("reproduction"), publish: bool = False) -> TableReproduction:
+def reproduce_on_table(
+    output: Path = Path("reproduction"), publish: bool = False, subject: Subject | None = None
+) -> TableReproduction:
     """Runs the paper's PD from each start under each friction, prints numbers and verdict and writes them.
 
     Args:
         output: folder for table_cases.png, table_numbers.csv and table_verdict.md.
         publish: also refresh the picture and the numbers in agents/paper/results.
+        subject: arm and elbows, which are the joints that lean; the paper's when None.
+
+    Raises:
+        ValueError: results of another arm or other elbows than the paper's would be published, or the arm cannot lean
+            on its elbows, be lifted off them or follow a circle.
     """
     from rich.console import Console
     from rich.markdown import Markdown
     from tqdm import tqdm
 
+    subject = subject or Subject()
+    check_publishable(publish, subject)
     check_writable(output)
-    settings = settings_of(0, "paper")
-    poses = [start_pose(settings.parsed_arm, lift) for lift in LIFTS.values()]
+    settings = settings_of(0, "paper", subject=subject)
+    starts = lifts(subject)
+    poses = [start_pose(subject.arm, subject.elbow_joints, lift) for lift in starts.values()]
     runs: dict[float, TableRecording] = {}
     layout = "{desc} {percentage:3.0f}%|{bar}| {elapsed} elapsed, {remaining} left"
     with tqdm(total=len(FRICTIONS) * settings.horizon, bar_format=layout) as bar:
         for friction in FRICTIONS:
             bar.set_description(f"friction {friction:g}")
             runs[friction] = play_on_table(poses, {"friction": friction}, settings, bar.update)
-    cases = {friction: dict(zip(LIFTS, measure_on_table(run), strict=True)) for friction, run in runs.items()}
-    text = table_markdown(cases)
+    cases = {
+        friction: dict(zip(starts, measure_on_table(run, subject.elbow_joints), strict=True))
+        for friction, run in runs.items()
+    }
+    text = table_markdown(cases, None if subject.published else subject.described())
     files = [
-        write_whole(output / "table_cases.png", table_figure(runs).savefig),
+        write_whole(output / "table_cases.png", table_figure(runs, cases).savefig),
         write_table_numbers(output / "table_numbers.csv", cases),
         write_text(output / "table_verdict.md", text),
     ]
@@ -78,17 +94,19 @@ def table_verdict(cases: Cases) -> list[Claim]:
 
 
 def _saving(friction: float, starts: Mapping[str, TableNumbers]) -> Claim:
-    three = [starts[name] for name in LIFTS]
-    whole, late = [n.energy for n in three], [n.energy_tracking for n in three]
-    saved = [1.0 - energy / late[2] for energy in late[:2]]
+    each = list(starts.values())
+    whole, late = [n.energy for n in each], [n.energy_tracking for n in each]
+    saved = "; ".join(
+        f"{name}: {1.0 - n.energy_tracking / late[-1]:.1%}" for name, n in starts.items() if name != CLEAR
+    )
     return Claim(
         f"friction {friction:g}",
         "The more joints lean on the table, the less energy the arm takes, in the whole run and from 2 s on.",
-        all(values[0] < values[1] < values[2] for values in (whole, late)),
-        f"energy for t > 2 s {_listed(late, 'J')}: two joints save {saved[0]:.1%}, one {saved[1]:.1%}; whole run "
-        f"{_listed(whole, 'J')}; hand error rms {_listed([n.error_rms for n in three], 'mm')}; leaning on two joints, "
-        f"windings turn {three[0].copper_loss_tracking:.3g} J into heat for t > 2 s, contacts "
-        f"{three[0].contact_loss_tracking:.2g} J",
+        all(less < more for values in (whole, late) for less, more in pairwise(values)),
+        f"energy for t > 2 s {_listed(late, 'J')}, of which leaning saves ({saved}); whole run "
+        f"{_listed(whole, 'J')}; hand error rms {_listed([n.error_rms for n in each], 'mm')}; leaning on "
+        f"{next(iter(starts))}, windings turn {each[0].copper_loss_tracking:.3g} J into heat for t > 2 s, contacts "
+        f"{each[0].contact_loss_tracking:.2g} J",
     )
 
 
@@ -98,27 +116,32 @@ def _listed(values: list[float], unit: str) -> str:
 
 def _loads(cases: Cases) -> Iterator[str]:
     """Sentences on the forces that the table bears from each start, a value per friction."""
-    for start in LIFTS:
+    for start, first in next(iter(cases.values())).items():
         numbers = [starts[start] for starts in cases.values()]
-        forces = {
-            "joint 4 for t > 2 s": [n.force_4_mean for n in numbers],
-            "joint 7 for t > 2 s": [n.force_7_mean for n in numbers],
-            "any other point, at most": [n.force_elsewhere_largest for n in numbers],
-        }
+        forces = {f"joint {joint} for t > 2 s": [n.force[joint].mean for n in numbers] for joint in first.force}
+        forces["any other point, at most"] = [n.force_elsewhere_largest for n in numbers]
         borne = (f"{name} {_listed(values, 'N')}" for name, values in forces.items() if max(values) > 0.0)
         yield f"Start {start}: {'; '.join(borne) or 'nothing'}."
 
 
-def table_markdown(cases: Cases) -> str:
-    """Verdict and loads as a Markdown document."""
+def table_markdown(cases: Cases, other: str | None = None) -> str:
+    """Verdict and loads as a Markdown document.
+
+    Args:
+        cases: the numbers that decide.
+        other: description of the arm where it is not the paper's on the paper's elbows.
+    """
+    starts = next(iter(cases.values()))
+    number = NUMBER_WORDS.get(len(starts), str(len(starts))).capitalize()
     lines = [
         "# Does leaning save energy on a table that cannot pull?",
         "",
-        "Three values stand for the starts " + " / ".join(LIFTS) + ". Every verdict is computed from the run.",
+        *([] if other is None else [f"Arm: {other}, under the paper's PD and its gains.", ""]),
+        f"{number} values stand for the starts " + " / ".join(starts) + ". Every verdict is computed from the run.",
         "",
     ]
     for number, claim in enumerate(table_verdict(cases), start=1):
-        holds = "Holds" if claim.holds else "FAILS"
+        holds = "Holds" if claim.holds else "FAILS" if other is None else "Does not hold here"
         lines += [f"{number}. **{holds}** ({claim.name}). {claim.statement}", "", f"   Evidence: {claim.evidence}.", ""]
     return "\n".join(
         [
@@ -136,15 +159,20 @@ def _unit(name: str) -> str:
 
 
 def write_table_numbers(path: Path, cases: Cases) -> Path:
-    """Writes a CSV row per friction and start: every field of `TableNumbers`."""
-    names = list(TableNumbers.__dataclass_fields__)
+    """Writes a CSV row per friction and start: every number of `TableNumbers`."""
+    names = _names(cases)
     header = ["friction [-]", "start", *(f"{name} [{_unit(name)}]" for name in names)]
     rows = [
-        [f"{friction:g}", start, *(f"{value:.6g}" for value in asdict(numbers).values())]
+        [f"{friction:g}", start, *(f"{value:.6g}" for value in numbers.columns.values())]
         for friction, starts in cases.items()
         for start, numbers in starts.items()
     ]
     return write_csv(path, header, rows)
+
+
+def _names(cases: Cases) -> list[str]:
+    """Names of the numbers, the same for every start and friction."""
+    return list(next(iter(next(iter(cases.values())).values())).columns)
 
 
 def terminal_table(cases: Cases) -> Any:
@@ -156,13 +184,13 @@ def terminal_table(cases: Cases) -> Any:
     table = Table(
         title="The paper's PD on a table that cannot pull",
         box=SIMPLE,
-        caption="Tracking, errors and forces on joints 4 and 7: t > 2 s; forces elsewhere: whole run.",
+        caption="Tracking, errors and forces on leaning joints: t > 2 s; forces elsewhere: whole run.",
     )
     table.add_column("", no_wrap=True)
     columns = [(friction, start) for friction, starts in cases.items() for start in starts]
     for friction, start in columns:
         table.add_column(f"{start}\nfriction {friction:g}", justify="right")
-    for name in TableNumbers.__dataclass_fields__:
-        values = (getattr(cases[friction][start], name) for friction, start in columns)
+    for name in _names(cases):
+        values = (cases[friction][start].columns[name] for friction, start in columns)
         table.add_row(escape(f"{name} [{_unit(name)}]".replace("_", " ")), *(f"{value:.4g}" for value in values))
     return table

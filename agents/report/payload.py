@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from agents.evaluation.metrics import REGIMES
 from agents.evaluation.players import TABLE
 from agents.evaluation.recording import Recording
-from agents.paper.figures import CASES, SETTLED, VIEWS
+from agents.paper.figures import SETTLED, VIEWS
+from agents.paper.numbers import PUBLISHED_CASES
 from agents.report.runs import Run
 from agents.style import ELBOW_NAMES, look
 from elbow_gym.kinematics import joint_positions
 
-BEARINGS = {**{str(elbows): ELBOW_NAMES[elbows] for elbows in CASES}, TABLE: "table that cannot pull"}
+BEARINGS = {**{str(elbows): ELBOW_NAMES[elbows] for elbows in PUBLISHED_CASES}, TABLE: "table that cannot pull"}
 """Words of the page for what an arm leans on, by its key."""
 LENGTH_UNIT = 1e-4
 """Unit of the joints' positions in the page [m]; the hand's, which errors are taken from, are in full."""

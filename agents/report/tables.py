@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from agents.evaluation.players import TABLE
-from agents.paper.cases import case_numbers, quantities
+from agents.paper.cases import case_numbers
 from agents.paper.claims import Numbers, disclosures, verdict
-from agents.paper.figures import CASES
+from agents.paper.numbers import PUBLISHED_CASES, quantities
 from agents.report.payload import BEARINGS
 from agents.report.runs import Run
 from agents.style import CONTROLLER_NAMES, ELBOW_NAMES, look
@@ -49,7 +49,7 @@ def paper_numbers(runs: Sequence[Run]) -> dict[int, Numbers]:
     """The paper's numbers by elbow count, of the counts whose three runs are all there."""
     measured = {(run.controller, run.start, run.bearing): run.measured for run in runs}
     found = {}
-    for elbows in CASES:
+    for elbows in PUBLISHED_CASES:
         cases = {name: measured.get((*key, str(elbows))) for name, key in PAPER_RUNS.items()}
         complete = {name: values for name, values in cases.items() if values is not None}
         if len(complete) == len(cases):
@@ -84,7 +84,7 @@ def headline(numbers: Mapping[int, Numbers], runs: Sequence[Run]) -> str:
 
 def claims(numbers: Mapping[int, Numbers]) -> str:
     """The paper's claims with their verdicts, and what should be known beside them."""
-    if len(numbers) < len(CASES):
+    if len(numbers) < len(PUBLISHED_CASES):
         return "<p>The verdicts need the paper's three cases; not all of their runs are in this file.</p>"
     judged = "".join(
         f'<li><p><strong class="{"holds" if claim.holds else "fails"}">{"Holds" if claim.holds else "Fails"}</strong> '
@@ -98,9 +98,9 @@ def claims(numbers: Mapping[int, Numbers]) -> str:
 def paper_table(numbers: Mapping[int, Numbers]) -> str:
     """Every number of the paper's cases beside the published one."""
     head = "".join(f"<th scope=col>{ELBOW_NAMES[elbows]}</th><th scope=col>published</th>" for elbows in numbers)
-    listed = [quantities(elbows, one) for elbows, one in numbers.items()]
+    listed = quantities(numbers) if numbers else {}
     body = ""
-    for row in zip(*listed, strict=True):
+    for row in zip(*listed.values(), strict=True):
         cells = "".join(f"<td>{_number(one.value)}</td><td>{_number(one.expected)}</td>" for one in row)
         body += f"<tr><th scope=row>{escape(row[0].name.replace('_', ' '))} [{row[0].unit}]</th>{cells}</tr>\n"
     return f"<table><thead><tr><th scope=col>quantity</th>{head}</tr></thead>\n<tbody>\n{body}</tbody></table>"

@@ -8,7 +8,7 @@ import pytest
 
 from agents.paper import cases as reproduce
 from agents.paper import claims as verdict
-from agents.paper import figures
+from agents.paper import figures, numbers
 from agents.style import ELBOW_COLOURS
 from elbow_gym import Simulator
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
@@ -347,7 +347,7 @@ def assert_published(values, elbows):
         if name in values:
             assert values[name] == pytest.approx(expected, rel=0.005), name
     # Published to a tenth of a joule, in places to a whole one.
-    published = reproduce.EXPECTED["joint_energy"][(2, 1, 0).index(elbows)]
+    published = numbers.EXPECTED["joint_energy"][(2, 1, 0).index(elbows)]
     for value, expected in zip(values["joint_energy"], published, strict=True):
         assert value == pytest.approx(expected, rel=0.005, abs=0.1)
     if elbows == 2:

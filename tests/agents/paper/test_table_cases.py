@@ -8,18 +8,27 @@ import pytest
 
 from agents.paper import table_claims as tabletop_report
 from agents.paper.cases import settings_of
-from agents.paper.table_cases import FRICTIONS, LIFTS, TableNumbers, measure_on_table, play_on_table, start_pose
+from agents.paper.subject import Subject
+from agents.paper.table_cases import FRICTIONS, Force, TableNumbers, lifts, measure_on_table, play_on_table, start_pose
 from agents.paper.table_figure import COLOURS
 from elbow_gym.kinematics import hand_position, joint_positions
 from elbow_gym.table import FRICTION_VELOCITY
 
 # shared/design/physics.md, "Beyond the paper": two elbows, k = 1e5 N/m, by friction; 2-5 s in joules, error rms in mm.
+ELBOWS = (4, 7)
+LIFTS = {"joints 4 and 7": (0.0, 0.0), "joint 4": (0.0, 0.1), "clear": (0.1, 0.2)}
 PUBLISHED = {0.0: (52.8, 13.5), 0.3: (96.0, 21.0)}
+
+
+def test_starts_of_the_papers_arm_are_those_of_the_published_numbers():
+    found = lifts(Subject())
+    assert list(found) == list(LIFTS)
+    np.testing.assert_allclose(list(found.values()), list(LIFTS.values()), atol=1e-12)
 
 
 @pytest.mark.parametrize("lift", LIFTS.values(), ids=LIFTS)
 def test_start_poses_lift_joints_4_and_7_and_leave_the_hand_where_it_was(arm, lift):
-    pose = start_pose(arm, lift)
+    pose = start_pose(arm, ELBOWS, lift)
     height = joint_positions(arm, pose)[:, 2]
     assert height[[3, 6]] == pytest.approx(lift, abs=1e-12)
     assert np.delete(height, [0, 1, 3, 6]).min() > 0.1
@@ -27,12 +36,18 @@ def test_start_poses_lift_joints_4_and_7_and_leave_the_hand_where_it_was(arm, li
 
 
 def test_the_pose_that_leans_on_two_joints_is_the_papers(arm):
-    np.testing.assert_allclose(start_pose(arm, (0.0, 0.0)), arm.nominal_pose, atol=1e-12)
+    np.testing.assert_allclose(start_pose(arm, ELBOWS, (0.0, 0.0)), arm.nominal_pose, atol=1e-12)
 
 
-def test_a_lift_out_of_the_hands_reach_is_refused(arm):
-    with pytest.raises(ValueError, match="within reach"):
-        start_pose(arm, (0.4, 0.0))
+def test_where_the_last_links_cannot_put_the_hand_back_it_is_lifted_with_the_last_elbow(arm):
+    pose = start_pose(arm, ELBOWS, (0.2, 0.4))
+    lifted = joint_positions(arm, pose) - joint_positions(arm, np.array(arm.nominal_pose))
+    np.testing.assert_allclose(lifted[[3, 6, 7, 8, 9, 10], 2], [0.2, 0.4, 0.4, 0.4, 0.4, 0.4], atol=1e-12)
+
+
+def test_a_lift_over_more_than_the_links_between_the_elbows_is_refused(arm):
+    with pytest.raises(ValueError, match=r"elbows must be 0\.8 m apart to be lifted, got 0\.\d+ m"):
+        start_pose(arm, ELBOWS, (0.0, 0.8))
 
 
 @pytest.fixture(scope="module")
@@ -62,20 +77,23 @@ def test_leaning_on_two_joints_costs_what_is_published(written, friction):
     energy, error = PUBLISHED[friction]
     assert numbers.energy_tracking == pytest.approx(energy, rel=0.005)
     assert numbers.error_rms == pytest.approx(error, rel=0.02)
-    assert numbers.force_7_mean == pytest.approx(7.96, abs=0.01)
-    assert numbers.force_4_largest == 0.0
+    assert numbers.force[7].mean == pytest.approx(7.96, abs=0.01)
+    assert numbers.force[4].largest == 0.0
 
 
 @pytest.mark.slow
 def test_committed_numbers_are_those_of_the_default_table(arm):
-    poses, settings = [start_pose(arm, LIFTS["joints 4 and 7"])], settings_of(0, "paper", control_frequency=2000.0)
-    [numbers] = measure_on_table(play_on_table(poses, {"friction": 0.3}, settings))
+    poses, settings = (
+        [start_pose(arm, ELBOWS, LIFTS["joints 4 and 7"])],
+        settings_of(0, "paper", control_frequency=2000.0),
+    )
+    [numbers] = measure_on_table(play_on_table(poses, {"friction": 0.3}, settings), ELBOWS)
     with (tabletop_report.RESULTS / "table_numbers.csv").open(newline="", encoding="utf-8") as handle:
         [row] = [
             row for row in csv.DictReader(handle) if (row["friction [-]"], row["start"]) == ("0.3", "joints 4 and 7")
         ]
     for column in ("energy_tracking [J]", "error_rms [mm]", "z_rms [mm]", "force_7_mean [N]"):
-        assert getattr(numbers, column.split()[0]) == pytest.approx(float(row[column]), rel=1e-3), column
+        assert numbers.columns[column.split()[0]] == pytest.approx(float(row[column]), rel=1e-3), column
 
 
 @pytest.mark.slow
@@ -132,12 +150,14 @@ def test_the_picture_shows_every_start(written):
     from matplotlib.image import imread
 
     pixels = imread(written[2] / "all" / "table_cases.png")[::2, ::2, :3]
-    for colour in COLOURS.values():
+    for colour in COLOURS[: len(LIFTS)]:
         assert (np.abs(pixels - to_rgb(colour)).max(axis=-1) < 0.1).sum() > 500
 
 
 def invented(level):
-    zero = dict.fromkeys(TableNumbers.__dataclass_fields__, 0.0)
+    zero = dict.fromkeys(TableNumbers.__dataclass_fields__, 0.0) | {
+        "force": dict.fromkeys(ELBOWS, Force(0.0, 0.0, 0.0))
+    }
     return TableNumbers(**{**zero, "energy": 10.0 * level, "energy_tracking": level, "error_rms": level})
 
 
@@ -157,5 +177,5 @@ def test_a_claim_that_the_numbers_refute_is_reported_as_failing(start, changes):
 def test_progress_tells_every_control_period(arm):
     settings = settings_of(0, "paper", duration=0.1)
     told = []
-    play_on_table([start_pose(arm, lift) for lift in LIFTS.values()], {"friction": 0.1}, settings, told.append)
+    play_on_table([start_pose(arm, ELBOWS, lift) for lift in LIFTS.values()], {"friction": 0.1}, settings, told.append)
     assert sum(told) == settings.horizon
