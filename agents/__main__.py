@@ -152,13 +152,23 @@ def bound(
 
 
 @app.command
-def verify(receipt: str, trust: bool = False) -> None:
-    """Plays the episodes of a receipt again and says how closely they agree: to the last bit, or to 1e-6 elsewhere.
+def verify(receipt: str | None = None, trust: bool = False) -> None:
+    """Checks a checkout, or plays the episodes of a receipt again; exit code 1 where something is wrong.
+
+    The checks are those of `python -m elbow_gym verify`, the shipped policies against their cards, and the PD's joules
+    with two, one and no elbow on the table, a line each. Episodes agree to the last bit on the same machine, versions
+    and code, and to 1e-6 elsewhere.
 
     Args:
-        receipt: Line of `python -m agents evaluate --receipt`, or a file that holds it.
+        receipt: Line of `python -m agents evaluate --receipt`, or a file that holds it; all checks when None.
         trust: Whether to read a .zip, whose pickles can run any code when they are read.
     """
+    if receipt is None:
+        from agents.verification import verify as verify_checkout
+
+        if not verify_checkout():
+            raise SystemExit(1)
+        return
     from agents.evaluation.command import verify_receipt
 
     verify_receipt(receipt, trust)

@@ -9,9 +9,9 @@ from agents.files import read_json
 from agents.learning.actor import copy_policy
 from agents.learning.run_folder import RunFolder
 from agents.shipped import CURVES, POLICIES
+from agents.shipped.seeds import check_name
 from agents.tasks import BEST
 from elbow_gym.baselines.policy import BASELINES, pair
-from elbow_gym.baselines.tasks import task_name
 
 LARGEST = 300_000
 """Largest size of a shipped policy's two files together [B]."""
@@ -115,11 +115,7 @@ def _checked(folder: RunFolder) -> str:
         raise ValueError(f"runs must hold a best policy, got none in {folder.path}")
     if not folder.evaluations():
         raise ValueError(f"runs must hold evaluations, got none in {folder.path}")
-    card, name = policy.card, folder.name
-    task = task_name(card.env, card.environment["elbows"])
-    ends = f"_{task}_seed{card.training['seed']}"
-    if not (name.startswith(card.algorithm) and name.endswith(ends)):
-        raise ValueError(f"runs must be named {card.algorithm}[_LABEL]{ends} as what they hold, got {name}")
+    check_name("runs", folder.name, policy.card)
     if folder.best_size() > LARGEST:
         raise ValueError(f"a policy must have at most {LARGEST} bytes, got {folder.best_size()} in {folder.path}")
-    return name
+    return folder.name

@@ -7,6 +7,7 @@ from pathlib import Path
 from agents.shipped import POLICIES
 from elbow_gym.baselines.policy import BASELINES, Policy, baseline_path, read_policy
 from elbow_gym.baselines.policy import load_policy as load_baseline
+from elbow_gym.baselines.policy_card import PolicyCard
 from elbow_gym.baselines.tasks import task_name
 
 
@@ -50,3 +51,10 @@ def shipped_seeds(name: str) -> list[int]:
 def shipped_policies() -> list[str]:
     """Names of all shipped policies, such as "ppo_elbows2_seed0"."""
     return sorted(path.stem for folder in (BASELINES, POLICIES) for path in folder.glob("*.json"))
+
+
+def check_name(what: str, name: str, card: PolicyCard) -> None:
+    """Raises ValueError unless the name of files is the one of the policy with this card. `what` the message names."""
+    ends = f"_{task_name(card.env, card.environment['elbows'])}_seed{card.training.get('seed')}"
+    if not (name.startswith(card.algorithm) and name.endswith(ends)):
+        raise ValueError(f"{what} must be named {card.algorithm}[_LABEL]{ends} as what they hold, got {name}")

@@ -13,19 +13,23 @@ import pytest
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import OpenLoop, Trajectory
 from agents.evaluation.metrics import REGIMES, UNITS
+from agents.evaluation.players import ELBOW_COUNTS
+from agents.evaluation.receipt import read_receipt
+from agents.evaluation.regimes import BENCHMARK_SEEDS
 from agents.learning.evaluation import evaluation
 from agents.optimal.guesses import rollout
+from agents.shipped import RECEIPTS
 from agents.shipped import seeds as shipped
 from agents.shipped.seeds import load_policy, shipped_policies
 from agents.style import CONTROLLER_NAMES
 from benchmarks.energy import breakdown, pareto
 from benchmarks.energy import cells as lineup
+from benchmarks.energy.statistics import interquartile_mean
 from benchmarks.machine import RESULTS
 from benchmarks.optimal import FRONT_WEIGHTS, Cell, cached, cells, files
 from elbow_gym import ElbowArmEnv
 from elbow_gym.baselines import policy as baselines
 from elbow_gym.baselines.policy import pair, read_policy
-from elbow_gym.baselines.tasks import task_name
 from elbow_gym.kinematics import joint_positions
 
 
@@ -126,6 +130,16 @@ def test_committed_trajectory_costs_the_same_under_the_lqr_whatever_the_integrat
     assert found == pytest.approx(cached(cell)["closed_loop"], rel=1e-5)
 
 
+def test_receipts_of_the_pd_are_of_the_committed_figures():
+    by_key = {(row["controller"], int(row["elbows"]), row["regime"]): row for row in committed()}
+    for elbows in ELBOW_COUNTS:
+        receipt = read_receipt(str(RECEIPTS / f"pd_elbows{elbows}.json"))
+        assert tuple(receipt["seeds"]) == BENCHMARK_SEEDS
+        for regime, joules in receipt["joules"].items():
+            expected = float(by_key["pd", elbows, regime]["electrical_energy [J]"])
+            assert interquartile_mean(joules).value == pytest.approx(expected, rel=1e-5)
+
+
 def test_every_shipped_policy_loads_fits_and_is_small():
     assert "ppo_elbows2_seed0" in shipped_policies()
     files = [path for folder in (baselines.BASELINES, shipped.POLICIES) for path in folder.iterdir()]
@@ -136,9 +150,6 @@ def test_every_shipped_policy_loads_fits_and_is_small():
         policy.check(ElbowArmEnv(**policy.card.environment))
         assert sum(part.stat().st_size for part in pair(path)) < 300_000
         assert policy.card.command.startswith(("python -m agents train", "python -m agents clone"))
-        task = task_name(policy.card.env, policy.card.environment["elbows"])
-        assert path.name.startswith(policy.card.algorithm)
-        assert path.name.endswith(f"{task}_seed{policy.card.training['seed']}")
 
 
 def test_baseline_is_the_best_seed_and_no_policy_is_stored_twice():
