@@ -1,7 +1,8 @@
-"""Trainings that are killed at random moments and resumed: `python -m tests.support.kills KIND FOLDER KILLS SEED`.
+"""Trainings killed at random moments and resumed: `python -m tests.support.kills KIND FOLDER KILLS SEED LATEST`.
 
-Four of five kills come after the first control period of a start, the others before. Each line on stdout is the time of
-a kill [s], after that period or after the start, and the checkpoint that it left; the last is "finished".
+Four of five kills come after the first control period of a start, the others before, at most LATEST seconds after it.
+Each line on stdout is the time of a kill [s], after that period or after the start, and the checkpoint that it left;
+the last is "finished".
 """
 
 import os
@@ -16,18 +17,16 @@ from agents.learning.callback import Keeper
 from agents.learning.train import train
 from agents.workers import compile_before
 from elbow_gym.task.settings import Settings
-from tests.support.trainings import SAC_KILLED, SAC_SMALL, SMALL, small_run
+from tests.support.trainings import SAC_KILLED, SMALL, small_run
 
 LONG = {
     "ppo": {"settings": replace(SMALL, total_timesteps=20_480, evaluate_every=2048)},
     "sac": {
         **SAC_KILLED,
-        "settings": replace(SAC_SMALL, total_timesteps=2400, learning_starts=400, evaluate_every=400),
+        "settings": replace(SAC_KILLED["settings"], total_timesteps=2400, evaluate_every=400),
     },
 }
 """Trainings of several seconds, by kind."""
-LATEST = 2.0
-"""Latest moment of a kill after the first control period, or after the start [s]."""
 
 
 def long_run(kind, folder):
@@ -57,7 +56,7 @@ def resumed(run):
     return process, seen
 
 
-def main(kind, folder, kills, seed):
+def main(kind, folder, kills, seed, latest):
     """Kills a run a number of times at random moments, and has it end after that."""
     run, draw = long_run(kind, Path(folder)), random.Random(int(seed))
     settings = Settings(**run.environment)
@@ -65,7 +64,7 @@ def main(kind, folder, kills, seed):
     compile_before([(settings, run.settings.num_envs), settings])
     for _ in range(int(kills)):
         process, seen = resumed(run)
-        moment, place = draw.uniform(0.0, LATEST), "after the start"
+        moment, place = draw.uniform(0.0, float(latest)), "after the start"
         if draw.random() < 0.8:
             place = "of training"
             os.read(seen, 1)

@@ -113,6 +113,7 @@ def assert_goes_on_to_the_same_policy(whole, cut, checkpoint, monkeypatch):
     # Steps and figures; seconds differ.
     columns = [[row[:1] + row[3:] for row in evaluations(run.folder)] for run in (whole, cut)]
     np.testing.assert_allclose(*columns, rtol=1e-12)
+    assert columns[0][-1][1:] != columns[0][-2][1:], "the policy must still change after the cut"
     for name, uncut in weights(whole.folder).items():
         np.testing.assert_array_equal(weights(cut.folder)[name], uncut)
 
