@@ -67,10 +67,19 @@ CASES = {
     "uniform, rough": (ROUGH, uniform, (5e-3, 2e-2), (5e-3, 2e-2)),
 }
 """Arguments of the environment, actions, and the largest mean and single errors of return and of energy."""
+SAMPLE = (
+    "policy, two elbows",
+    "bang-bang, no elbow",
+    "policy on the table",
+    "gentle on a table with friction",
+    "uniform, rough",
+)
+"""Cases that have what all have: elbows and none, voltages that jump, a table that rubs, every switch at once."""
+NAMES = [pytest.param(name, marks=() if name in SAMPLE else pytest.mark.soak) for name in CASES]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", NAMES)
 def test_default_steps_agree_with_steps_of_a_twentieth_of_a_millisecond(name):
     arguments, act, *bounds = CASES[name]
     coarse, fine, default = (play(arguments, act, substeps) for substeps in (200, 400, None))

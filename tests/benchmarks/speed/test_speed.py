@@ -33,7 +33,7 @@ def small_batches(monkeypatch):
 
 @pytest.fixture
 def no_batch_of_rk4(monkeypatch):
-    """Batches take exponential steps alone, for no other test compiles the kernel of 16 lanes for the classical ones."""
+    """Batches take exponential steps alone, since no other test compiles the kernel of their classical ones."""
     step = contenders._step
 
     def exponential(joints, elbows, arms, unit=contenders.RK4_STEP, **how):
