@@ -16,6 +16,9 @@ from gymnasium.wrappers.vector import (
     RescaleAction,
 )
 from imageio_ffmpeg import get_ffmpeg_exe
+
+pytest.importorskip("stable_baselines3")
+
 from stable_baselines3 import PPO
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize, VecVideoRecorder

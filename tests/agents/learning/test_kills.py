@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytest.importorskip("stable_baselines3")
+
 from agents.learning.train import train
 from elbow_gym.baselines.policy import read_policy
 from tests.support.kills import long_run

@@ -17,6 +17,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+pytest.importorskip("stable_baselines3")
+
 import torch
 from stable_baselines3 import PPO
 from tqdm import tqdm

@@ -1,6 +1,9 @@
 """CleanRL's form of PPO: advantages by hand, and that it learns."""
 
 import pytest
+
+pytest.importorskip("torch")
+
 import torch
 
 from agents.recipes import cleanrl_ppo

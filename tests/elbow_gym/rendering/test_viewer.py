@@ -13,7 +13,6 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 from gymnasium.wrappers import HumanRendering, RecordVideo
 from gymnasium.wrappers.vector import RecordVideo as RecordVectorVideo
 from imageio_ffmpeg import count_frames_and_secs
-from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv
 from elbow_gym.rendering.screen import Window
@@ -58,7 +57,8 @@ def started(steps=3, **settings):
 def test_both_checkers_find_nothing_in_any_mode(name, mode):
     env = gym.make(f"elbow_gym:{name}", render_mode=mode, **SMALL)
     check_env(env.unwrapped)
-    check_env_sb3(env, skip_render_check=False)
+    sb3 = pytest.importorskip("stable_baselines3.common.env_checker")
+    sb3.check_env(env, skip_render_check=False)
 
 
 @pytest.mark.parametrize("size", [(640, 480), (200, 300)])

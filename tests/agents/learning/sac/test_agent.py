@@ -5,10 +5,13 @@ from itertools import pairwise
 import gymnasium
 import numpy as np
 import pytest
-import torch
 from gymnasium.envs.classic_control import PendulumEnv
 from gymnasium.spaces import Box
 from gymnasium.wrappers import TimeLimit
+
+pytest.importorskip("stable_baselines3")
+
+import torch
 
 from agents.learning.sac.agent import SAC, Batch, CentredPolicy
 from agents.learning.sac.critic import QuadraticCritics

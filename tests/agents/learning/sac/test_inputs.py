@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+
+pytest.importorskip("torch")
+
 import torch
 
 from agents.learning.sac.inputs import AHEAD, GAIN, VELOCITY_SCALE, Foresight, Sharpened
