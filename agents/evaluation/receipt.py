@@ -10,18 +10,35 @@ from typing import Any
 
 import numpy as np
 
+from agents.evaluation.metrics import REGIMES
 from agents.evaluation.player import Player
 from agents.evaluation.players import find_player
 from agents.evaluation.regimes import Results, in_all_regimes
 from agents.machine import code, machine, versions
 from agents.tasks import plain_arguments
+from elbow_gym.checks import is_finite
 
 TOLERANCE = 1e-6
 """Largest difference of an episode's energy between machines, over the energy or 1 J, whichever is more [-]."""
 PACKAGES = ("elbow-gym", "numpy", "numba", "scipy")
 """Libraries whose versions results depend on to the last bit."""
 ASKED = ("what", "env", "elbows", "arguments")
-ENTRIES = (*ASKED, "settings", "seeds", "player", "joules", "digest", "code", "machine", "versions")
+KINDS: dict[str, tuple[str, tuple[type, ...]]] = {
+    "what": ("a name", (str,)),
+    "env": ("an id", (str,)),
+    "elbows": ("a number, joints or null", (int, list, type(None))),
+    "arguments": ("an object", (dict,)),
+    "settings": ("an object", (dict,)),
+    "seeds": ("a list", (list,)),
+    "player": ("a digest", (str,)),
+    "joules": ("an object", (dict,)),
+    "digest": ("a digest", (str,)),
+    "code": ("a digest", (str,)),
+    "machine": ("an object", (dict,)),
+    "versions": ("an object", (dict,)),
+}
+"""Entries of a receipt: what each is, and its types."""
+ENTRIES = tuple(KINDS)
 
 
 def receipt(asked: Mapping[str, Any], player: Player, seeds: list[int], results: Results) -> dict[str, Any]:
@@ -50,7 +67,7 @@ def read_receipt(word: str) -> dict[str, Any]:
     """The receipt in a line, or in a file that holds one.
 
     Raises:
-        ValueError: it is neither, or an entry is missing.
+        ValueError: it is neither, or an entry is missing or of another kind.
     """
     try:
         # A line is too long for a file's name, and some systems say so by an error.
@@ -63,7 +80,27 @@ def read_receipt(word: str) -> dict[str, Any]:
     missing = [name for name in ENTRIES if not isinstance(plain, dict) or name not in plain]
     if missing:
         raise ValueError(f"receipt must have the entries {', '.join(ENTRIES)}, got none of {', '.join(missing)}")
+    for name, (rule, types) in KINDS.items():
+        if not isinstance(plain[name], types) or isinstance(plain[name], bool):
+            raise ValueError(f"{name} of the receipt must be {rule}, got {plain[name]!r:.60}")
+    _check_seeds_and_joules(plain["seeds"], plain["joules"])
     return plain
+
+
+def _check_seeds_and_joules(seeds: list[Any], joules: dict[str, Any]) -> None:
+    """Raises ValueError unless there are seeds, and a number of joules for each of them in every regime."""
+    if not seeds or not all(type(seed) is int and seed >= 0 for seed in seeds):
+        raise ValueError(f"seeds of the receipt must be whole numbers from 0 on, at least one, got {seeds!r:.60}")
+    regimes = [regime.name for regime in REGIMES]
+    if sorted(joules) != sorted(regimes):
+        raise ValueError(
+            f"joules of the receipt must be of the regimes {', '.join(regimes)}, got {sorted(joules)!r:.60}"
+        )
+    for regime, values in joules.items():
+        if not isinstance(values, list) or not all(type(one) in (int, float) and is_finite(one) for one in values):
+            raise ValueError(f"joules of regime {regime} must be finite numbers, got {values!r:.60}")
+        if len(values) != len(seeds):
+            raise ValueError(f"joules of regime {regime} must be one for each seed, got {len(values)} of {len(seeds)}")
 
 
 def player_again(given: Mapping[str, Any], trust: bool = False) -> Player:
@@ -77,7 +114,10 @@ def player_again(given: Mapping[str, Any], trust: bool = False) -> Player:
         ValueError: there is no such player here, or it is another one, or plays in other settings.
     """
     elbows = tuple(given["elbows"]) if isinstance(given["elbows"], list) else given["elbows"]
-    player = find_player(given["what"], elbows, given["env"], given["arguments"], trust)
+    try:
+        player = find_player(given["what"], elbows, given["env"], given["arguments"], trust)
+    except TypeError as error:
+        raise ValueError(f"arguments of the receipt must be an environment's, got {given['arguments']}") from error
     if given["player"] != player.identity:
         raise ValueError(f"player of the receipt must have the digest {given['player']}, got {player.identity}")
     own = plain_arguments(player.settings)
@@ -106,8 +146,6 @@ def verify(given: Mapping[str, Any], player: Player, progress: Callable[[int, in
     worst, where = 0.0, "every episode"
     for regime, told in given["joules"].items():
         before, now = np.asarray(told, dtype=np.float64), np.asarray(own["joules"][regime])
-        if before.shape != now.shape:
-            raise ValueError(f"joules of regime {regime} must have one number a seed, got {before.shape}")
         apart = np.abs(now - before) / np.maximum(np.abs(before), 1.0)
         apart[np.isnan(apart)] = np.inf
         if apart.max() > worst:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from elbow_gym import LinkParameters, kinematics
+from elbow_gym import LinkParameters, Simulator, kinematics
 from tests.support.strategies import between, cases
 
 NUDGE = 1e-6
@@ -85,6 +85,25 @@ def test_the_hand_is_the_point_after_the_last_joint(arm):
         for step in steps
     ]
     np.testing.assert_allclose(kinematics.constraint_jacobian(arm, q, [11])[0], slopes, atol=1e-8)
+
+
+@pytest.mark.parametrize("elbows", [(4,), (4, 7), (3, 5, 8)])
+def test_elbows_of_a_pose_on_the_table_are_at_zero(arm, elbows):
+    found = kinematics.on_table(arm, arm.nominal_pose, elbows)
+    np.testing.assert_allclose(kinematics.elbow_heights(arm, found, elbows), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("elbows", [(4,), (4, 7)])
+def test_pose_near_the_table_is_moved_to_where_the_simulator_moves_it(arm, elbows):
+    q = np.array(arm.nominal_pose) + np.random.default_rng(3).normal(scale=0.02, size=10)
+    found = kinematics.on_table(arm, q, elbows)
+    np.testing.assert_allclose(found, Simulator(arm, elbows, 1).on_table(q)[0], atol=1e-10)
+
+
+def test_elbow_that_cannot_reach_the_table_is_refused(arm):
+    upright = replace(arm, links=(*arm.links[:2], LinkParameters(length=2.0), *arm.links[3:]))
+    with pytest.raises(ValueError, match=r"^elbows must be able to lie on the table, got heights "):
+        kinematics.on_table(upright, np.zeros(10), (4,))
 
 
 @given(angles, between(-0.1, 0.02))

@@ -10,6 +10,7 @@ import random
 import signal
 import sys
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,6 +33,17 @@ LONG = {
 def long_run(kind, folder):
     """A run of `LONG` with a checkpoint twenty times a second, into a folder."""
     return small_run(folder, checkpoint_seconds=0.05, **LONG[kind])
+
+
+FILLER = "filler"
+"""File that takes all that is left of a disk."""
+
+
+def fill(place):
+    """Fills the disk that a folder is on."""
+    with suppress(OSError), (place / FILLER).open("ab", buffering=0) as file:
+        while True:
+            file.write(bytes(4096))
 
 
 def resumed(run):

@@ -87,6 +87,29 @@ def test_what_is_no_receipt_is_refused(word):
         read_receipt(word)
 
 
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"what": 3}, "what of the receipt must be a name, got 3"),
+        ({"elbows": True}, "elbows of the receipt must be a number, joints or null, got True"),
+        ({"settings": None}, "settings of the receipt must be an object, got None"),
+        ({"seeds": []}, "seeds of the receipt must be whole numbers from 0 on, at least one, got "),
+        ({"seeds": [1.5, 2]}, "seeds of the receipt must be whole numbers from 0 on, at least one, got "),
+        ({"joules": {"A": [1.0, 2.0]}}, "joules of the receipt must be of the regimes A, B, C, got "),
+        ({"joules": {"A": [1.0], "B": [1.0], "C": [1.0]}}, "joules of regime A must be one for each seed, got 1 of 2"),
+        ({"joules": {"A": [1.0, 10**400], "B": [], "C": []}}, "joules of regime A must be finite numbers, got "),
+    ],
+)
+def test_entry_of_another_kind_is_named(line, changes, message):
+    with pytest.raises(ValueError, match=rf"^{message}"):
+        read_receipt(json.dumps(altered(line, **changes)))
+
+
+def test_arguments_that_no_environment_has_are_named(line):
+    with pytest.raises(ValueError, match=r"^arguments of the receipt must be an environment's, got \{'foo': 1\}"):
+        player_again(altered(line, arguments={"foo": 1}))
+
+
 def test_digest_covers_every_metric(line):
     player = player_again(json.loads(line))
     results = receipts.in_all_regimes(player, [20_000, 20_001])

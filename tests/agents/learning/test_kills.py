@@ -13,7 +13,7 @@ pytest.importorskip("stable_baselines3")
 
 from agents.learning.train import train
 from elbow_gym.baselines.policy import read_policy
-from tests.support.kills import long_run
+from tests.support.kills import FILLER, long_run
 
 ROOT = Path(__file__).parents[3]
 KILLS, SEED = 30, 20_240_601
@@ -45,15 +45,15 @@ def test_training_that_was_killed_at_random_moments_ends_bit_for_bit_as_the_one_
         np.testing.assert_array_equal(read_policy(killed.folder / "best").weights[name], weights)
 
 
-FULL = """
+TROUBLED = """
 import os, resource, shutil, sys
 from pathlib import Path
 from agents.learning.callback import Keeper
-from tests.support.kills import long_run
+from tests.support.kills import fill, long_run
 from agents.learning.train import train_all
 on_step = Keeper._on_step
 def step(keeper):
-    if keeper.num_timesteps > 4096:
+    if keeper.num_timesteps > {begin}:
         {trouble}
     return on_step(keeper)
 Keeper._on_step = step
@@ -61,34 +61,54 @@ from agents.cli import Commands
 app = Commands("program", "Trains until there is trouble.")
 @app.command
 def go() -> None:
-    train_all([long_run("ppo", Path(sys.argv[1]))])
+    train_all([long_run("{kind}", Path(sys.argv[1]))])
 app.run(["go"])
 """
 TROUBLES = {
-    "full": ("resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))", "File too large: "),
+    "full": ("fill(Path(sys.argv[1]).parent)", "No space left on device: "),
+    "limited": ("resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))", "File too large: "),
     "gone": ("shutil.rmtree(sys.argv[1], ignore_errors=True)", "No such file or directory: "),
     "forbidden": ("os.geteuid() or os.seteuid(65534)", "Permission denied: "),
 }
 
 
+@pytest.fixture
+def disk(tmp_path):
+    """A disk of 20 MB in memory."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=20m", "none", str(place)]
+    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode != 0:
+        pytest.skip("only the superuser can make a disk, and only where that is allowed")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
 @pytest.mark.soak
+@pytest.mark.parametrize(("kind", "begin"), [("ppo", 4096), ("sac", 1000)])
 @pytest.mark.parametrize("trouble", TROUBLES)
-def test_trouble_with_the_disk_in_the_middle_ends_with_a_sentence_and_the_run_goes_on_later(tmp_path, trouble):
+def test_trouble_with_the_disk_in_the_middle_ends_with_a_sentence_and_the_run_goes_on_later(
+    tmp_path, trouble, kind, begin, request
+):
     if trouble == "forbidden" and os.geteuid() != 0:
         pytest.skip("only the superuser can give up a permission in the middle")
     code, message = TROUBLES[trouble]
-    folder = tmp_path / "run"
-    command = [sys.executable, "-c", FULL.format(trouble=code), str(folder)]
-    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    folder = (request.getfixturevalue("disk") if trouble == "full" else tmp_path) / "run"
+    script = TROUBLED.format(trouble=code, kind=kind, begin=begin)
+    ended = subprocess.run(
+        [sys.executable, "-c", script, str(folder)], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 1, ended.stderr
     print(ended.stderr.splitlines()[-1])
-    assert ended.returncode == 1
     assert ended.stderr.splitlines()[-1].startswith(f"error: {message}{folder}"), ended.stderr
     assert "Traceback" not in ended.stderr
     assert ended.stdout.splitlines()[-1].startswith(f"run: failed: {message}{folder}")
-    run = long_run("ppo", folder)
+    run = long_run(kind, folder)
+    if trouble == "full":
+        (folder.parent / FILLER).unlink()
     if trouble != "gone":
         assert run.files.checkpoint().progress()["steps"] > 0
-        whole = train(long_run("ppo", tmp_path / "whole"))
+        whole = train(long_run(kind, tmp_path / "whole"))
         assert train(run, resume=True)["best"] == whole["best"]
 
 

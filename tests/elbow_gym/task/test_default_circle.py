@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from elbow_gym import ArmParameters, LinkParameters, MotorParameters, paper_arm
-from elbow_gym.kinematics import elbow_heights, inverse_kinematics, on_table
-from elbow_gym.simulator import Simulator
+from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.task.circle import Circle
 from elbow_gym.task.default_circle import default_circle
 from elbow_gym.task.settings import Settings
@@ -65,24 +64,6 @@ def test_arm_that_no_circle_suits_is_refused_for_the_papers():
 def test_given_circle_is_kept():
     circle = {"center": [0.9, 0.9, 0.4]}
     assert Settings(arm=SIX, elbows=(4,), circle=circle).parsed_circle == Circle(center=(0.9, 0.9, 0.4))
-
-
-@pytest.mark.parametrize("elbows", [(4,), (4, 7), (3, 5, 8)])
-def test_elbows_of_a_pose_on_the_table_are_at_zero(elbows):
-    found = on_table(paper_arm(), paper_arm().nominal_pose, elbows)
-    np.testing.assert_allclose(elbow_heights(paper_arm(), found, elbows), 0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("elbows", [(4,), (4, 7)])
-def test_pose_near_the_table_is_moved_to_where_the_simulator_moves_it(elbows):
-    q = np.array(paper_arm().nominal_pose) + np.random.default_rng(3).normal(scale=0.02, size=10)
-    found = on_table(paper_arm(), q, elbows)
-    np.testing.assert_allclose(found, Simulator(paper_arm(), elbows, 1).on_table(q)[0], atol=1e-10)
-
-
-def test_elbow_that_cannot_reach_the_table_is_refused():
-    with pytest.raises(ValueError, match=r"^elbows must be able to lie on the table, got heights "):
-        on_table(arm_of((1.0, 0.1, 0.1), (0.0, 0.0, 0.0, 0.0)), np.zeros(4), (4,))
 
 
 def test_arm_is_read_from_a_file_once(tmp_path):
