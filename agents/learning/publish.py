@@ -12,6 +12,7 @@ from agents.shipped import CURVES, POLICIES
 from agents.shipped.seeds import check_name
 from agents.tasks import BEST
 from elbow_gym.baselines.policy import BASELINES, pair
+from elbow_gym.checks import as_dict, finite
 
 LARGEST = 300_000
 """Largest size of a shipped policy's two files together [B]."""
@@ -97,8 +98,9 @@ def _check_better(
 
 
 def _merit(card: Path) -> float:
-    """Return of a policy at the evaluation that chose it, from its card."""
-    return float(read_json(card)["evaluation"]["return"])
+    """Return of a policy at the evaluation that chose it, from its card. Raises ValueError where there is none."""
+    evaluation = as_dict(f"evaluation in {card}", read_json(card).get("evaluation"))
+    return finite(f"return in {card}", evaluation.get("return"))
 
 
 def _remove_policy(path: Path) -> None:

@@ -55,6 +55,9 @@ def shipped_policies() -> list[str]:
 
 def check_name(what: str, name: str, card: PolicyCard) -> None:
     """Raises ValueError unless the name of files is the one of the policy with this card. `what` the message names."""
-    ends = f"_{task_name(card.env, card.environment['elbows'])}_seed{card.training.get('seed')}"
+    elbows = card.environment.get("elbows")
+    # JSON has no tuples.
+    task = task_name(card.env, tuple(elbows) if isinstance(elbows, list) else elbows)
+    ends = f"_{task}_seed{card.training.get('seed')}"
     if not (name.startswith(card.algorithm) and name.endswith(ends)):
         raise ValueError(f"{what} must be named {card.algorithm}[_LABEL]{ends} as what they hold, got {name}")

@@ -2,12 +2,14 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import pytest
 
+from agents.learning.actor import save_policy
 from agents.learning.publish import publish
 from agents.shipped.seeds import shipped_path
-from elbow_gym.baselines.policy import pair, read_policy
+from elbow_gym.baselines.policy import Policy, pair, read_policy
 
 
 @pytest.fixture
@@ -37,6 +39,28 @@ def test_label_goes_into_the_name(run, tmp_path):
     assert publish([cloned], **places(tmp_path)) == ["ppo_cloned_elbows2_seed0"]
 
 
+def altered_card(run, **entries):
+    card = json.loads((run / "best.json").read_text())
+    (run / "best.json").write_text(json.dumps(card | entries))
+    return card
+
+
+def test_policy_of_elbows_by_their_joints_is_published_under_them(run, tmp_path):
+    policy = read_policy(run / "best")
+    joints = replace(policy.card, environment=policy.card.environment | {"elbows": [4, 7]}, digest="")
+    save_policy(Policy(joints, policy.weights), run / "best")
+    named = run.rename(run.with_name("ppo_joints4_7_seed0"))
+    assert publish([named], **places(tmp_path)) == ["ppo_joints4_7_seed0"]
+
+
+@pytest.mark.parametrize("evaluation", [{}, {"return": float("nan")}, {"return": "high"}])
+def test_policy_without_a_return_takes_no_place(run, tmp_path, evaluation):
+    publish([run], **places(tmp_path))
+    altered_card(run, evaluation=evaluation)
+    with pytest.raises(ValueError, match=r"^return in .*best.json must be "):
+        publish([run], **places(tmp_path))
+
+
 def test_unfinished_misnamed_and_large_runs_are_refused(run, tmp_path, monkeypatch):
     (run / "result.json").write_text(json.dumps({"finished": False}))
     with pytest.raises(ValueError, match="runs must be finished trainings, got"):
@@ -56,10 +80,10 @@ def test_unfinished_misnamed_and_large_runs_are_refused(run, tmp_path, monkeypat
 def test_worse_policy_takes_no_better_ones_place_unless_allowed(run, tmp_path):
     shipped = places(tmp_path)
     publish([run], **shipped)
-    card = json.loads((run / "best.json").read_text())
+    card = altered_card(run)
     better = card["evaluation"]["return"]
     card["evaluation"]["return"] = better - 1.0
-    (run / "best.json").write_text(json.dumps(card))
+    altered_card(run, evaluation=card["evaluation"])
     for more in ({}, {"replace_seeds": True}):
         message = (
             rf"return must be at least the shipped ppo_elbows2_seed0's {better:.2f}, or --allow-worse be given, got"
