@@ -141,7 +141,9 @@ class ArmParameters:
         require_entries(plain, sorted(allowed - {"gravity"}), "arm")
         values = dict(plain)
         values["links"] = tuple(_part(LinkParameters, part, "links") for part in _sequence("links", plain["links"]))
-        values["motors"] = tuple(_motor(part) for part in _sequence("motors", plain["motors"]))
+        values["motors"] = tuple(
+            _part(MotorParameters, part, "motors") for part in _sequence("motors", plain["motors"])
+        )
         for name in ("joint_viscous_friction", "nominal_pose"):
             values[name] = tuple(_sequence(name, plain[name]))
         return cls(**values)
@@ -154,20 +156,16 @@ def _sequence(name: str, value: object) -> Sequence[Any]:
 
 
 def _part(kind: type[Any], plain: object, owner: str) -> Any:
+    may_be_preset = kind is MotorParameters
+    if may_be_preset and isinstance(plain, str):
+        return motor(plain)
     if not isinstance(plain, Mapping):
         raise ValueError(f"{owner} must hold dicts of {kind.__name__}, got {plain!r}")
     mapping = cast("Mapping[str, Any]", plain)
+    if may_be_preset and PRESET in mapping:
+        return motor(mapping[PRESET], **{name: value for name, value in mapping.items() if name != PRESET})
     check_entries(mapping, {field.name for field in fields(kind)}, owner)
     return kind(**mapping)
-
-
-def _motor(plain: object) -> MotorParameters:
-    if isinstance(plain, str):
-        return motor(plain)
-    mapping = cast("Mapping[str, Any]", plain if isinstance(plain, Mapping) else {})
-    if PRESET in mapping:
-        return motor(mapping[PRESET], **{name: value for name, value in mapping.items() if name != PRESET})
-    return _part(MotorParameters, plain, "motors")
 
 
 def paper_arm() -> ArmParameters:
