@@ -18,6 +18,7 @@ from agents.control.controller import Controller
 from agents.evaluation.onnx_model import OnnxModel, contract_of
 from agents.evaluation.player import Player, player_of, policy_player
 from agents.evaluation.sb3_model import check_trust, load_model
+from agents.evaluation.statistics import statistics_file
 from agents.tasks import BEST, RUNS, Elbows, task_settings
 from elbow_gym.baselines.policy import pair, read_policy
 from elbow_gym.parameters import as_elbows
@@ -73,7 +74,7 @@ def own_player(
     if path.suffix == ".zip":
         check_trust(path, trust)
         settings = task_settings(env, elbows, arguments)
-        return player_of(name, settings, partial(load_model, path), identity=_digest(path))
+        return player_of(name, settings, partial(load_model, path), identity=_digest(path, statistics_file(path)))
     if path.suffix == ".onnx":
         contract = contract_of(path)
         trained = task_settings(env, elbows, arguments) if contract is None else _settings(contract, elbows, arguments)
@@ -151,5 +152,5 @@ def _imported(name: str) -> Any:
     return thing
 
 
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def _digest(*paths: Path | None) -> str:
+    return hashlib.sha256(b"".join(path.read_bytes() for path in paths if path is not None)).hexdigest()

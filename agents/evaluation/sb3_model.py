@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from agents.evaluation.statistics import Normalised, Statistics, statistics_beside
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 
@@ -15,17 +16,23 @@ def check_trust(path: Path, trust: bool) -> None:
 
 
 def load_model(path: Path, env: ElbowArmVectorEnv) -> Any:
-    """The policy in a .zip of `model.save`, which acts deterministically; its `predict` takes batches.
+    """The controller in a .zip of `model.save`, whose `predict` takes batches. See `read_model` for the rest."""
+    policy, statistics = read_model(path, env)
+    return policy if statistics is None else Normalised(policy, statistics)
 
-    The file says nothing of a `VecNormalize` in training: such a model is exported with its statistics, see
-    `agents.learning.actor.policy_of`.
+
+def read_model(path: Path, env: ElbowArmVectorEnv) -> tuple[Any, Statistics | None]:
+    """The policy in a .zip of `model.save`, and how the observations that it takes differ from the environment's.
+
+    The statistics of a `VecNormalize` in training are in another file, which is looked for beside the .zip.
 
     Args:
         path: the .zip, a file that is trusted: its pickles can run any code when they are read.
         env: the environment that the policy will act in.
 
     Raises:
-        ValueError: the file is no model's, its spaces are not the environment's, or it is recurrent.
+        ValueError: the file is no model's, its spaces are not the environment's, it is recurrent, or it was trained on
+            other observations and the statistics are missing or another training's.
         DependencyNotInstalled: Stable-Baselines3 is missing.
     """
     try:
@@ -52,4 +59,4 @@ def load_model(path: Path, env: ElbowArmVectorEnv) -> Any:
         raise ValueError(f"{path} must hold a policy without memory, got {type(policy).__name__}")
     policy.load_state_dict(parameters["policy"])
     policy.set_training_mode(False)
-    return policy
+    return policy, statistics_beside(path, data.get("_last_obs"), env.observation_names)

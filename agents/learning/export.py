@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from agents.evaluation.onnx_model import contract_path, write_onnx
 from agents.evaluation.own import located
+from agents.evaluation.statistics import statistics_file
 from agents.learning.actor import policy_of
 from agents.shipped.seeds import load_policy
 from agents.task_options import TaskOptions
@@ -49,14 +50,19 @@ def export(what: str, output: Path, task: TaskOptions, trust: bool) -> str:
 def _of_zip(path: Path, settings: Settings, env: str, trust: bool) -> Policy:
     """The policy in a .zip of `model.save`, in the environment that it was trained in."""
     import stable_baselines3 as sb3
+    from stable_baselines3.common.vec_env import VecNormalize
 
-    from agents.evaluation.sb3_model import check_trust, load_model
+    from agents.evaluation.sb3_model import check_trust, read_model
     from elbow_gym.sb3 import SB3VecEnv
 
     check_trust(path, trust)
     batch = ElbowArmVectorEnv(1, **settings.arguments, autoreset_mode="SameStep")
-    kind = type(load_model(path, batch)).__module__.split(".")[1].upper()
+    policy, statistics = read_model(path, batch)
+    kind = type(policy).__module__.split(".")[1].upper()
     if kind not in MODELS:
         raise ValueError(f"{path} must be a model of one of {MODELS}, got {kind}")
-    model = getattr(sb3, kind).load(path, env=SB3VecEnv(batch), device="cpu")
+    arms = SB3VecEnv(batch)
+    file = statistics_file(path)
+    trained = arms if statistics is None or file is None else VecNormalize.load(str(file), arms)
+    model = getattr(sb3, kind).load(path, env=trained, device="cpu")
     return policy_of(model, settings, f"{path.name} of Stable-Baselines3", env)
