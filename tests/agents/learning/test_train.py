@@ -129,7 +129,8 @@ def test_run_that_was_cut_off_goes_on_to_the_same_policy(done, tmp_path, monkeyp
 
 @pytest.mark.slow
 def test_sac_that_was_cut_off_goes_on_to_the_same_policy(tmp_path, monkeypatch):
-    whole, cut = (small_run(tmp_path / name, checkpoint_seconds=0.0, **SAC_KILLED) for name in ("whole", "cut"))
+    whole = small_run(tmp_path / "whole", **SAC_KILLED)
+    cut = small_run(tmp_path / "cut", checkpoint_seconds=0.0, **SAC_KILLED)
     train(whole)
     cut_down(cut, monkeypatch)
     assert_goes_on_to_the_same_policy(whole, cut, 600, monkeypatch)

@@ -15,6 +15,7 @@ from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.task.circle import Circle
 from tests.support.recordings import made_up, papers_target
+from tests.support.workers import in_this_process
 
 # shared/design/physics.md, "Numbers that any right implementation gives", by elbow count.
 TABLE = {
@@ -221,16 +222,21 @@ def assert_drawn_in_three_colours(path):
 
 
 def draw_chosen(folder, monkeypatch, chosen):
-    """Draws figures of made-up runs into a folder: those that are chosen, by name."""
-    every = figures.figures
+    """Draws figures of made-up runs into a folder: those that are chosen, by name; other courses are not even made."""
+    every, course = figures.figures, figures._course
+
+    def made(cases, title, *arguments, **how):
+        name = f"fig{int(title.removeprefix('Fig. ').split(':')[0]):02d}"
+        return course(cases, title, *arguments, **how) if name in chosen else None
 
     def some(cases):
         for name, figure in every(cases):
             if name in chosen:
                 yield name, figure
-            else:
+            elif figure is not None:
                 figures.pyplot().close(figure)
 
+    monkeypatch.setattr(figures, "_course", made)
     monkeypatch.setattr(figures, "figures", some)
     return figures.draw({elbows: synthetic(elbows) for elbows in (2, 1, 0)}, folder)
 
@@ -295,8 +301,7 @@ def test_published_files_are_refreshed_when_asked(written):
         assert (folder / "results" / name).read_bytes() == (folder / "all" / original).read_bytes()
 
 
-@pytest.mark.slow
-def test_runs_in_other_processes_report_their_progress_and_their_errors():
+def assert_all_report_their_progress_and_their_errors():
     short = {elbows: reproduce.settings_of(elbows, "24 V", control_frequency=200.0, duration=2.1) for elbows in (2, 0)}
     told = []
     played = reproduce.play_all(short, told.append)
@@ -307,6 +312,16 @@ def test_runs_in_other_processes_report_their_progress_and_their_errors():
     beyond = reproduce.settings_of(0, "24 V", circle={"center": (0.3, 0.0, 0.4)})
     with pytest.raises(ValueError, match="within reach"):
         reproduce.play_all({0: beyond}, told.append)
+
+
+def test_runs_sent_to_other_processes_report_their_progress_and_their_errors(monkeypatch):
+    monkeypatch.setattr(reproduce, "in_processes", in_this_process)
+    assert_all_report_their_progress_and_their_errors()
+
+
+@pytest.mark.soak
+def test_runs_in_other_processes_report_their_progress_and_their_errors():
+    assert_all_report_their_progress_and_their_errors()
 
 
 def direct(elbows, period, limit, steps=None):

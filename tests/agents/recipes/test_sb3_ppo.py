@@ -10,7 +10,7 @@ pytest.importorskip("stable_baselines3")
 from agents.recipes import sb3_ppo
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_return_rises_within_six_updates():
     returns = returns_of(sb3_ppo.train, 96_000)
     assert len(returns) == 6

@@ -223,7 +223,7 @@ class Bandit(gymnasium.Env):
         return self.seen, -0.5 * float(miss @ self.form @ miss), True, False, {}
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_learns_the_best_action_of_a_quadratic_problem():
     model = SAC(
         "MlpPolicy",
