@@ -99,7 +99,11 @@ COMPILED = {"the paper's arm": (), "table": ("table",), "everything": ("table", 
 
 @pytest.mark.parametrize("on", COMPILED)
 def test_a_few_random_settings_are_refused_or_right(on):
-    outcomes = {seed: outcome(seed, COMPILED[on]) for seed in range(10)}
+    # Where elbows can rub there must be some, for without any of them the kernel is another one.
+    rubs = "rubbing" in COMPILED[on]
+    drawn = (draw(np.random.default_rng((SEED, seed)), on=COMPILED[on]).arguments for seed in range(30))
+    seeds = [seed for seed, arguments in enumerate(drawn) if arguments["elbows"] or not rubs][:10]
+    outcomes = {seed: outcome(seed, COMPILED[on]) for seed in seeds}
     assert not wrong(outcomes)
     assert Counter(outcomes.values())["right"] >= 6
 

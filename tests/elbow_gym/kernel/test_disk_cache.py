@@ -30,7 +30,10 @@ pytestmark = pytest.mark.skipif(not hasattr(compiled(lambda x: x), "py_func"), r
 
 
 @pytest.fixture
-def folder(tmp_path):
+def folder(tmp_path, monkeypatch):
+    # The cache lies beside the source, wherever the user has it.
+    monkeypatch.setattr("numba.config.CACHE_DIR", "")
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     (tmp_path / "small.py").write_text(SOURCE)
     return tmp_path
 
@@ -95,5 +98,5 @@ def test_a_killed_process_frees_its_lock(tmp_path):
 @pytest.mark.slow
 def test_of_processes_that_start_together_one_compiles(folder):
     words = [sys.executable, "-c", WORKER, str(folder)]
-    workers = [subprocess.Popen(words, stdout=subprocess.PIPE, text=True) for _ in range(4)]
-    assert sorted(int(worker.communicate(timeout=300)[0]) for worker in workers) == [0, 0, 0, 1]
+    workers = [subprocess.Popen(words, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    assert sorted(int(worker.communicate(timeout=300)[0]) for worker in workers) == [0, 1]
