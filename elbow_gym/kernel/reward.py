@@ -6,11 +6,12 @@ from fractions import Fraction
 
 def fused(a: float, b: float, c: float) -> float:
     """A b + c, rounded once, as a processor's fused multiply-add gives it."""
+    exact = a * b + c
+    # A processor gives infinity or NaN here, where `math.fma` raises.
+    if not math.isfinite(exact):
+        return exact
     if hasattr(math, "fma"):  # from Python 3.13 on
         return math.fma(a, b, c)  # pyright: ignore
-    exact = a * b + c
-    if not math.isfinite(exact) or not (math.isfinite(a) and math.isfinite(b)):
-        return exact
     return float(Fraction(a) * Fraction(b) + Fraction(c)) or exact
 
 

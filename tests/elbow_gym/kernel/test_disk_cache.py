@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 
+import numba
 import pytest
 
 from elbow_gym.kernel import disk_cache
