@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 from typing import Any
@@ -82,5 +83,22 @@ def main(words: list[str] | None = None) -> None:
     compile_kernels(given.variants or ["paper"], list(SIZES) if given.size == "both" else [given.size])
 
 
+def run(words: list[str]) -> None:
+    """Carries out a command line; Ctrl-C, and an output that takes nothing more, end it without a traceback."""
+    try:
+        try:
+            main(words)
+        finally:
+            sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except BrokenPipeError:
+        # Python flushes the output once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except OSError as error:
+        sys.exit(f"error: {error.strerror or error}")
+
+
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    run(sys.argv[1:])

@@ -73,7 +73,7 @@ def read_receipt(word: str) -> dict[str, Any]:
         # A line is too long for a file's name, and some systems say so by an error.
         text = Path(word).read_text(encoding="utf-8") if len(word) < 256 and Path(word).is_file() else word
         plain = json.loads(text)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ValueError(
             f"receipt must be a line of `evaluate --receipt` or its file, got {word:.60}: {error}"
         ) from error

@@ -17,6 +17,8 @@ Point = tuple[float, float, float]
 
 PLANES = ("xy", "xz", "yz", "radial")
 SHAPES = ("circle", "figure_eight")
+FURTHEST = 1e100
+"""Largest coordinate of a path's point [m], beyond any arm's reach: sums of larger ones can overflow."""
 
 
 def as_plane(plane: object) -> str | tuple[str, ...]:
@@ -41,7 +43,11 @@ def as_shape(shape: object) -> str | tuple[Point, ...]:
     points = cast("Sequence[object]", shape)
     if len(points) < 3:
         raise ValueError(f"circle shape must have at least 3 points, got {len(points)}")
-    return tuple(_as_point(point) for point in points)
+    checked = tuple(_as_point(point) for point in points)
+    far = max(abs(coordinate) for point in checked for coordinate in point)
+    if far > FURTHEST:
+        raise ValueError(f"circle shape must have coordinates of at most {FURTHEST:g} m, got {far:g}")
+    return checked
 
 
 def _as_point(point: object) -> Point:

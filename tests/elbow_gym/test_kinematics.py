@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from elbow_gym import LinkParameters, Simulator, kinematics
+from tests.support.arms import uneven_arm
 from tests.support.strategies import between, cases
 
 NUDGE = 1e-6
@@ -124,6 +125,18 @@ def test_inverse_kinematics_rates_are_the_exact_derivative(arm, angle):
         kinematics.inverse_kinematics(arm, arm.nominal_pose, circle(angle + step)[0])[0] for step in (-NUDGE, NUDGE)
     )
     np.testing.assert_allclose(rates, (after - before) / (2.0 * NUDGE), atol=1e-8)
+
+
+@given(between(-3.0, 3.0), between(-1.0, 1.0), between(0.3, 2.8))
+def test_inverse_kinematics_undoes_the_forward_one_where_links_differ(yaw, turn, bend):
+    arm = uneven_arm()
+    q, rates = np.array(arm.nominal_pose), np.zeros(10)
+    q[0], q[-1] = yaw, bend
+    q[-2] += turn
+    rates[[0, -2, -1]] = 0.7, -1.3, 0.9
+    before, position, after = (kinematics.hand_position(arm, q + step * rates) for step in (-NUDGE, 0.0, NUDGE))
+    found = kinematics.inverse_kinematics(arm, arm.nominal_pose, position, (after - before) / (2.0 * NUDGE))
+    np.testing.assert_allclose(found, (q, rates), atol=1e-7)
 
 
 @given(st.lists(angles, min_size=2, max_size=5))

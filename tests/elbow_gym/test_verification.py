@@ -1,11 +1,13 @@
 """`python -m elbow_gym verify` and `info`: every check passes here, and notices what it is for."""
 
+import errno
 import json
 from dataclasses import fields
 
 import numpy as np
 import pytest
 
+from elbow_gym import __main__ as program
 from elbow_gym import verification
 from elbow_gym.__main__ import main
 from elbow_gym.task.settings import Settings
@@ -52,6 +54,28 @@ def test_a_fast_form_that_is_off_by_a_billionth_fails(check, part, monkeypatch):
     monkeypatch.setattr(verification, "accelerations", off)
     with pytest.raises(AssertionError, match=r"must agree to 1e-09, got "):
         check()
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (KeyboardInterrupt(), 130),
+        (BrokenPipeError(), 1),
+        (OSError(errno.ENOSPC, "No space left on device"), "error: No space left on device"),
+    ],
+)
+def test_interrupted_program_and_one_whose_output_is_not_taken_end_without_a_traceback(
+    error, code, monkeypatch, tmp_path
+):
+    def interrupted(_):
+        raise error
+
+    with (tmp_path / "output").open("w") as output:
+        monkeypatch.setattr(program, "main", interrupted)
+        monkeypatch.setattr("sys.stdout", output)
+        with pytest.raises(SystemExit) as ended:
+            program.run([])
+        assert ended.value.code == code
 
 
 def test_info_tells_ids_arguments_and_observations(capsys):

@@ -81,7 +81,7 @@ def test_other_player_or_other_settings_are_refused(line, changes, message):
         player_again(altered(line, **changes))
 
 
-@pytest.mark.parametrize("word", ["nothing.json", "{", "[]", '{"what": "pd"}'])
+@pytest.mark.parametrize("word", ["nothing.json", "{", "[" * 100_000, "[]", '{"what": "pd"}'])
 def test_what_is_no_receipt_is_refused(word):
     with pytest.raises(ValueError, match=r"^receipt must "):
         read_receipt(word)

@@ -87,6 +87,7 @@ def test_clockwise_passes_the_points_backwards_from_the_first():
         ([*CORNERS, (1.0, 2.0)], r"circle shape must have points of three finite numbers, got \(1.0, 2.0\)"),
         ([*CORNERS, (1.0, 2.0, math.inf)], r"circle shape must have points of .*, got \(1.0, 2.0, inf\)"),
         ([*CORNERS, (1.0, "up", 0.0)], r"circle shape must have points of .*, got \(1.0, 'up', 0.0\)"),
+        ([*CORNERS, (0.0, -1e308, 0.0)], r"circle shape must have coordinates of at most 1e\+100 m, got 1e\+308"),
         ([*CORNERS, 7], "circle shape must have points of three finite numbers, got 7"),
     ],
 )
