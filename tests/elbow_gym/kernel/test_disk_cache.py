@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 
-import numba
 import pytest
 
 from elbow_gym.kernel import disk_cache

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from elbow_gym import ArmParameters, Circle, LinkParameters, MotorParameters, paper_arm
-from elbow_gym.task.circle import as_circle, as_phase, check_reachable, reach_shortfall
+from elbow_gym.task.circle import as_circle, as_phase, check_reachable, extreme_points, reach_shortfall
 
 CENTER = np.array([1.5, 1.5, 0.4])
 OUTWARD = np.array([1.0, 1.0, 0.0]) / math.sqrt(2.0)
@@ -102,6 +102,15 @@ def test_circle_of_another_type_is_refused_by_name():
         as_circle(3.0)
 
 
+def test_center_may_be_an_array():
+    assert Circle(center=CENTER) == Circle()
+
+
+@pytest.mark.parametrize(("phase", "kept"), [(2000.0 * math.pi + 0.3, 0.3), (-1e3, -1e3), (1e3, 1e3)])
+def test_whole_turns_are_taken_out_of_a_large_phase(phase, kept):
+    assert as_phase(phase) == pytest.approx(kept, abs=1e-12)
+
+
 @pytest.mark.parametrize("value", [True, "random", math.inf])
 def test_phase_must_be_a_finite_number(value):
     with pytest.raises(ValueError, match=f"^phase must .*, got {value!r}$"):
@@ -140,6 +149,12 @@ def test_a_link_longer_than_the_others_together_leaves_a_hole_around_the_base():
     )
     points = [(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.0, 0.9), (0.0, 1.5, 0.0)]
     np.testing.assert_allclose(reach_shortfall(arm, (), points), [0.8, 0.3, -0.1, 0.3], atol=1e-12)
+
+
+def test_path_is_sampled_at_each_degree_and_45_times_a_wave_where_there_are_more_than_eight():
+    assert len(extreme_points(Circle())) == 361
+    points = [(1.0 + 0.1 * math.cos(k), 1.0 + 0.1 * math.sin(k), 0.4) for k in range(40)]
+    assert len(extreme_points(Circle(shape=points))) == 1 + 45 * 20
 
 
 def test_unreachable_circle_says_which_point_and_by_how_much():

@@ -190,5 +190,7 @@ def test_no_circle_of_an_accepted_set_is_out_of_reach_by_more_than_the_set_was_f
 def test_the_widest_circle_is_fixed_and_the_largest_that_may_be_drawn():
     widest = Circle.from_dict(EVERYTHING).widest
     assert not widest.drawn
+    assert widest.center == pytest.approx((1.3, 1.3, 0.45))
+    assert (widest.period, widest.phase, widest.direction) == (4.5, 0.0, "counterclockwise")
     assert widest.radius == max(circle.radius for circle in [widest, *drawn(EVERYTHING)])
     assert Circle(radius=0.2).widest == Circle(radius=0.2)
