@@ -23,6 +23,26 @@ LAYOUT = task.ObservationLayout(10)
 FEATURES = {feature.name: feature for feature in task.FEATURES}
 
 
+# Shipped policies rest on these: what changes them is another version.
+VERSION_1 = {
+    "joint_angle": ("rad", 0.3, 10.0),
+    "joint_velocity": ("rad/s", 2.0, 100.0),
+    "current": ("A", 5.0, 500.0),
+    "hand_error": ("m", 0.5, 10.0),
+    "hand_position": ("m", 0.5, 10.0),
+    "lookahead_error": ("m", 0.5, 10.0),
+    "target_angle": ("-", 1.0, 1.0),
+    "contact_force": ("N", 5.0, 1e4),
+    "temperature_rise": ("K", 50.0, 1e4),
+    "pending_voltage": ("V", 24.0, 1e4),
+}
+
+
+def test_units_scales_and_limits_are_those_of_version_1():
+    found = {one.name: (one.unit, one.scale, one.limit) for one in (*task.FEATURES, *task.SWITCHED_FEATURES)}
+    assert (task.OBSERVATION_VERSION, found) == (1, VERSION_1)
+
+
 def arms():
     """Three arms without elbows in random states with 0.01 s of motion behind them."""
     rng = np.random.default_rng(7)
