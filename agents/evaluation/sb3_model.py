@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from agents.evaluation.statistics import Normalised, Statistics, statistics_beside
 from elbow_gym.vector_env import ElbowArmVectorEnv
@@ -17,12 +17,23 @@ def check_trust(path: Path, trust: bool) -> None:
 
 def load_model(path: Path, env: ElbowArmVectorEnv) -> Any:
     """The controller in a .zip of `model.save`, whose `predict` takes batches. See `read_model` for the rest."""
-    policy, statistics = read_model(path, env)
-    return policy if statistics is None else Normalised(policy, statistics)
+    saved = read_model(path, env)
+    return saved.policy if saved.statistics is None else Normalised(saved.policy, saved.statistics)
 
 
-def read_model(path: Path, env: ElbowArmVectorEnv) -> tuple[Any, Statistics | None]:
-    """The policy in a .zip of `model.save`, and how the observations that it takes differ from the environment's.
+class SavedModel(NamedTuple):
+    """What a .zip of `model.save` says of how a model acts."""
+
+    algorithm: str
+    """Name of the algorithm, such as "PPO"; TD3 for DDPG, whose policies are of the same class."""
+    policy: Any
+    """Policy, whose `predict` takes batches of the observations of its training."""
+    statistics: Statistics | None
+    """How these differ from the environment's; None where they do not."""
+
+
+def read_model(path: Path, env: ElbowArmVectorEnv) -> SavedModel:
+    """The model in a .zip of `model.save`.
 
     The statistics of a `VecNormalize` in training are in another file, which is looked for beside the .zip.
 
@@ -59,4 +70,9 @@ def read_model(path: Path, env: ElbowArmVectorEnv) -> tuple[Any, Statistics | No
         raise ValueError(f"{path} must hold a policy without memory, got {type(policy).__name__}")
     policy.load_state_dict(parameters["policy"])
     policy.set_training_mode(False)
-    return policy, statistics_beside(path, data.get("_last_obs"), env.observation_names)
+    statistics = statistics_beside(path, data.get("_last_obs"), env.observation_names)
+    algorithm = type(policy).__module__.split(".")[1].upper()
+    if algorithm == "COMMON":
+        # PPO and A2C have one class of policies.
+        algorithm = "PPO" if "clip_range" in data else "A2C"
+    return SavedModel(algorithm, policy, statistics)

@@ -17,7 +17,7 @@ from elbow_gym.task.settings import Settings
 
 
 def policy_of(model: Any, settings: Settings, command: str, env: str = "ElbowArm-v0", **more: dict[str, Any]) -> Policy:
-    """The deterministic actor of an SB3 model (PPO's or SAC's kind) as a `Policy`.
+    """The deterministic actor of an SB3 model (PPO's, SAC's or TD3's kind) as a `Policy`.
 
     The statistics of a `VecNormalize` go into the first layer, so that the policy takes plain observations. It acts as
     the model while no entry is more than `clip_obs` standard deviations off its mean, where `VecNormalize` clips it.
@@ -95,14 +95,16 @@ def _check_wrappers(env: Any) -> None:
 
 
 def played_layers(model: Any) -> list[Any]:
-    """The torch layers from the observation to what an SB3 model of PPO's or SAC's kind does deterministically."""
+    """The torch layers from the observation to what an SB3 model of `policy_of` does deterministically."""
     return list(model.policy.average)[:-1] if hasattr(model.policy, "average") else actor_layers(model)
 
 
 def actor_layers(model: Any) -> list[Any]:
     """The torch layers from the observation to the mean action of the actor that learns."""
     if hasattr(model.policy, "actor"):
-        return [*model.policy.actor.latent_pi, model.policy.actor.mu]
+        actor = model.policy.actor
+        # TD3's is one network that ends in the tanh, SAC's has the tanh outside.
+        return [*actor.latent_pi, actor.mu] if hasattr(actor, "latent_pi") else list(actor.mu)[:-1]
     return [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
 
 

@@ -17,8 +17,8 @@ from elbow_gym.vector_env import ElbowArmVectorEnv
 if TYPE_CHECKING:
     from elbow_gym.task.settings import Settings
 
-MODELS = ("PPO", "SAC", "A2C", "TD3", "DDPG")
-"""Algorithms of Stable-Baselines3 with continuous actions."""
+MODELS = ("PPO", "SAC", "A2C", "TD3")
+"""Algorithms of Stable-Baselines3 with continuous actions, DDPG being read as TD3."""
 
 
 def export(what: str, output: Path, task: TaskOptions, trust: bool) -> str:
@@ -57,12 +57,11 @@ def _of_zip(path: Path, settings: Settings, env: str, trust: bool) -> Policy:
 
     check_trust(path, trust)
     batch = ElbowArmVectorEnv(1, **settings.arguments, autoreset_mode="SameStep")
-    policy, statistics = read_model(path, batch)
-    kind = type(policy).__module__.split(".")[1].upper()
-    if kind not in MODELS:
-        raise ValueError(f"{path} must be a model of one of {MODELS}, got {kind}")
+    saved = read_model(path, batch)
+    if saved.algorithm not in MODELS:
+        raise ValueError(f"{path} must be a model of one of {MODELS}, got {saved.algorithm}")
     arms = SB3VecEnv(batch)
     file = statistics_file(path)
-    trained = arms if statistics is None or file is None else VecNormalize.load(str(file), arms)
-    model = getattr(sb3, kind).load(path, env=trained, device="cpu")
+    trained = arms if saved.statistics is None or file is None else VecNormalize.load(str(file), arms)
+    model = getattr(sb3, saved.algorithm).load(path, env=trained, device="cpu")
     return policy_of(model, settings, f"{path.name} of Stable-Baselines3", env)

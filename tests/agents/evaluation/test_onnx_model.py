@@ -106,12 +106,13 @@ def test_output_with_another_suffix_is_refused(tmp_path):
 
 
 @pytest.mark.slow
-def test_model_of_stable_baselines3_is_exported(tmp_path):
+@pytest.mark.parametrize("algorithm", ["PPO", "A2C", "SAC", "TD3"])
+def test_model_of_stable_baselines3_is_exported(algorithm, tmp_path):
     sb3 = pytest.importorskip("stable_baselines3")
     from elbow_gym.sb3 import SB3VecEnv
 
     env = SB3VecEnv(ElbowArmVectorEnv(2, autoreset_mode="SameStep"))
-    model = sb3.SAC("MlpPolicy", env, seed=1, policy_kwargs={"net_arch": [8]})
+    model = getattr(sb3, algorithm)("MlpPolicy", env, seed=1, policy_kwargs={"net_arch": [8]}, device="cpu")
     model.save(tmp_path / "model")
     said = export(str(tmp_path / "model.zip"), tmp_path / "model.onnx", TaskOptions(elbows=2), trust=True)
     assert "model.onnx and model.onnx.json: actions differ" in said
