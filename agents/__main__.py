@@ -71,7 +71,7 @@ def clone(words: Sequence[str]) -> Callable[..., None]:
 
 @app.command
 def publish(
-    runs: Annotated[tuple[Path, ...], Positional, arg(metavar="FOLDER [FOLDER ...]")],
+    runs: Annotated[tuple[Path, ...], Positional, arg(metavar="FOLDER [FOLDER ...]", help_behavior_hint="(required)")],
     /,
     replace_seeds: bool = False,
     allow_worse: bool = False,
@@ -91,7 +91,7 @@ def publish(
 
 @app.command
 def evaluate(
-    players: Annotated[tuple[str, ...], Positional, arg(metavar="WHAT [WHAT ...]")],
+    players: Annotated[tuple[str, ...], Positional, arg(metavar="WHAT [WHAT ...]", help_behavior_hint="(required)")],
     /,
     task: OmitArgPrefixes[TaskOptions] = TASK,
     episodes: Count = 20,

@@ -13,7 +13,7 @@ import sys
 import textwrap
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from functools import partial
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Annotated, Any, NoReturn, get_type_hints
@@ -21,6 +21,8 @@ from typing import Annotated, Any, NoReturn, get_type_hints
 import tyro
 from tyro.conf import CascadeSubcommandArgs
 from tyro.constructors import PrimitiveConstructorSpec
+
+from agents.tyro_text import Wrapped, one_line
 
 HELP = ("-h", "--help")
 WIDTH = 80
@@ -134,7 +136,7 @@ def parse(function: Function, prog: str, words: Sequence[str]) -> Callable[[], A
     call.__doc__ = re.sub(r"\n {8}", " ", inspect.getdoc(function) or "")
     said = io.StringIO()
     try:
-        with redirect_stderr(said):
+        with redirect_stderr(said), redirect_stdout(Wrapped(sys.stdout)):
             return tyro.cli(call, prog=prog, args=words, config=(CascadeSubcommandArgs,))
     except SystemExit as end:
         if not end.code:
@@ -151,28 +153,6 @@ def spelled(package: str, command: str, words: Sequence[str]) -> str:
         words: the command line after it.
     """
     return shlex.join(["python", "-m", package, command, *map(_without_folders, words)])
-
-
-def one_line(box: str) -> str:
-    """The reason in tyro's framed message, with the options or words that could be meant; the rest is left out."""
-    # Colours, and drawn or blank frames, follow the terminal.
-    plain = re.sub(r"\x1b\[[\d;]*m", "", box)
-    lines = re.findall(r"^(?:│ |  )(.*?)[ │]*$", plain, re.MULTILINE) or plain.splitlines()
-    end = next((k for k, line in enumerate(lines) if not line.strip("─-")), None)
-    # Help texts are indented by eight.
-    reason = " ".join(line.strip() for line in lines[:end] if not line.startswith(" " * 8))
-    reason = reason.removeprefix("Error parsing ").rstrip(".")
-    # An option's own rule follows its name; a group's name is left out, since its rule names the option.
-    reason = re.sub(r"^(--[\w-]+): (?=must)", r"\1 ", re.sub(r"^[a-z]\w*: ", "", reason))
-    if not reason.startswith("Unrecognized"):
-        return reason
-    meant = [line.split()[0].rstrip(",") for line in lines if re.match(" {4}--", line)]
-    if "misplaced" in reason:
-        places = dict.fromkeys(re.findall(r"^ {8}in .* (\w+) --help$", "\n".join(lines), re.MULTILINE))
-        return f"{', '.join(meant)} must come after {' or '.join(places)}"
-    known = [line.removeprefix("Available subcommands: ") for line in lines if line.startswith("Available subcommands")]
-    more = [f"perhaps {' or '.join(meant)} is meant"] if meant else []
-    return "; ".join([reason, *more, *(f"known: {names}" for names in known)])
 
 
 @contextmanager

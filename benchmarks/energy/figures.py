@@ -35,6 +35,8 @@ PANELS = (
     Panel("B", "error_rms", "B: track, 2-5 s", "hand error, rms (mm)"),
 )
 BEARING_MARKERS = {2: "o", 1: "s", 0: "^"}
+LEAST_SPAN = 10.0
+"""Largest value of an axis over its smallest, at least [-]."""
 APART = 0.2
 """Distance between the points of two elbow counts, as a multiple of that between two controllers [-]."""
 
@@ -77,7 +79,10 @@ def figure(rows: Sequence[Row], path: Path) -> None:
             )
         ax.set_xscale("log")
         low, high = ax.get_xlim()
-        ticks = [step * 10.0**power for power in range(-2, 5) for step in (1.0, 3.0)]
+        # Controllers that are alike are to look alike, and a tick is to be between the ends.
+        wider = max(1.0, np.sqrt(LEAST_SPAN * low / high))
+        low, high = ax.set_xlim(low / wider, high * wider)
+        ticks = [step * 10.0**power for power in range(-6, 7) for step in (1.0, 3.0)]
         ax.xaxis.set_major_locator(FixedLocator([tick for tick in ticks if low <= tick <= high]))
         ax.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         ax.xaxis.set_minor_formatter(NullFormatter())

@@ -94,12 +94,15 @@ def report(rows: Sequence[Row], poses: int, every_seed: bool, written: Sequence[
             parts += [f"{part.capitalize()} part: {what}", table(chosen)]
     nominal = [row for row in rows if row.part == "nominal" and row.gain == 1.0]
     training = "all training seeds" if every_seed else "the best training seed"
-    figures = f"Each number is the interquartile mean over {poses} start poses, of learned controllers with {training}."
+    figures = f"Each number is the interquartile mean over {poses} start poses"
+    figures += f", of learned controllers with {training}." if any(row.seeds for row in rows) else "."
     regimes = "; ".join(f"{regime.name}: {regime.meaning}" for regime in REGIMES)
-    gap = "Gap: excess over the least cost (minus the return) that optimal control has found."
+    gap = ""
+    if any(row.gap is not None for row in rows):
+        gap = " Gap: excess over the least cost (minus the return) that optimal control has found."
     sentences = [
         meaning(nominal),
-        f"{figures} {regimes}. {gap}",
+        f"{figures} {regimes}.{gap}",
         f"Files: {', '.join(_short(path) for path in written)}",
     ]
     if not every_seed:

@@ -99,3 +99,12 @@ def test_short_table_has_a_row_for_each_featured_controller_alone():
     lines = short(rows([*FEATURED, "clone", "pd_smooth"])).splitlines()
     assert len(lines) == 2 + len(FEATURED) <= 2 + 8
     assert {line.split(" | ")[0].strip("| ") for line in lines[2:]} == {CONTROLLER_NAMES[name] for name in FEATURED}
+
+
+def test_what_is_not_in_the_report_is_not_explained():
+    unbounded = report([replace(row, gap=None) for row in rows(["pd"])], 3, False, [])
+    assert "Gap:" not in unbounded
+    assert "learned" not in unbounded
+    everything = " ".join(report([replace(row, seeds=({},)) for row in rows(["ppo"])], 3, False, []).split())
+    assert "of learned controllers with the best training seed" in everything
+    assert "Gap: excess over the least cost" in everything
