@@ -5,37 +5,35 @@
 import numpy as np
 
 from elbow_gym.kernel.dense import cholesky_solve, gauss_solve
-from elbow_gym.kernel.rows import ELBOW_SPEED, LARGEST_AMPLIFICATION, MAXIMUM_ELBOWS
+from elbow_gym.kernel.rows import ELBOW_SPEED, LARGEST_AMPLIFICATION, MAXIMUM_ELBOWS, RESOLVED_FRICTION
 from elbow_gym.kernel.slots import (
-    ASTRAY, C3, COUPLING, CR, CZ, D, ELBOW_FRICTION, ER, EZ, FORCES, FREE_RISE, IR3, IZ3, LANES, LOSS, MATRIX, NEXT,
-    PUSH, PUSHING, PUSH_LIMIT, Q_DOT, R, RHO, RHO_DOT, ROTOR, SLIDE_R, SLIDE_T, STRIDE, TABLE, TWIST, U, W, X, Y,
+    ASTRAY, C3, COME_UP, COUPLING, CR, CZ, D, ELBOW_FRICTION, ER, EZ, FORCES, FREE_RISE, IR3, IZ3, LANES, LOSS, MATRIX,
+    MOBILITY, NEXT, PAYLOAD, PUSH, PUSHING, PUSH_LIMIT, Q_DOT, R, RADIAL_RISE, RHO, RHO_DOT, ROTOR, SLIDE_R, SLIDE_T,
+    STEP, STRIDE, TABLE, TWIST, U, W, X, Y, YAW_INERTIA,
 )  # fmt: skip
 from elbow_gym.kernel.template import template
 
 
 @template
-def friction_response(ws, shared, lanes, elbow, j):
-    """Friction per newton of an elbow's force [-], and x, the recursion's answer to its radial part.
+def friction_response(ws, shared, lanes, tip, elbow, j):
+    """x, the recursion's answer to a unit radial force at an elbow, and the elbow's mobility: what a newton moves it.
 
-    Reads: Q_DOT, ROTOR, RHO, RHO_DOT, ER, EZ, D, ELBOW_FRICTION, IR3, IZ3, CR, CZ, C3.
-    Writes: CR, CZ, C3, X, SLIDE_R, SLIDE_T.
+    The mobility [1/kg] is the larger of those along the radius and across it, by the yaw.
+
+    Reads: PAYLOAD, RHO, YAW_INERTIA, ROTOR, ER, EZ, D, IR3, IZ3, CR, CZ, C3, MOBILITY.
+    Writes: CR, CZ, C3, X, MOBILITY.
     """
     record = U((elbow - 2) * STRIDE)
+    mobility = MOBILITY + U(j * W)
     for k in range(lanes):
-        here = record + k
-        child = here + NEXT
-        radial = ws[here + RHO_DOT]
-        tangential = ws[here + RHO] * ws[Q_DOT + k]
-        speed = np.sqrt(radial * radial + tangential * tangential + ELBOW_SPEED * ELBOW_SPEED)
-        share = -ws[here + ELBOW_FRICTION] / speed
-        shared[SLIDE_R + U(j * W) + k] = share * radial
-        shared[SLIDE_T + U(j * W) + k] = share * tangential
-        ws[child + CR] = -share * radial
+        child = record + k + NEXT
+        ws[child + CR] = -1.0
         ws[child + CZ] = 0.0
         ws[child + C3] = 0.0
+        shared[mobility + k] = 0.0
     for a in range(elbow - 2, 0, -1):
         record = U(a * STRIDE)
-        for k in range(LANES):
+        for k in range(lanes):
             here = record + k
             child = here + NEXT
             cr = ws[child + CR]
@@ -46,18 +44,25 @@ def friction_response(ws, shared, lanes, elbow, j):
             ws[here + CZ] = cz + dx * ws[here + IZ3]
             ws[here + C3] = -ws[here + ROTOR] * dx
             ws[here + U(X + j * W)] = x
+            shared[mobility + k] += dx * x
+    record = U((elbow - 2) * STRIDE)
+    for k in range(lanes):
+        end = tip + k
+        inertia = ws[end + YAW_INERTIA] + ws[end + PAYLOAD] * ws[end + RHO] * ws[end + RHO] + ws[ROTOR + k]
+        rho = ws[record + k + RHO]
+        shared[mobility + k] = max(shared[mobility + k], rho * rho / inertia)
 
 
 @template
-def friction_coupling(ws, shared, lanes, elbows):
-    """Keeps the matrix and the free accelerations, and finds what friction adds to it: the rise at i for a newton on j.
+def friction_coupling(ws, shared, lanes, tip, elbows):
+    """Keeps the matrix and the free accelerations, and finds what a radial newton at j adds to the rise at i.
 
-    Reads: D, Y, X, FORCES, COUPLING.
-    Writes: MATRIX, COUPLING, FREE_RISE.
+    Reads: D, Y, X, FORCES, RADIAL_RISE.
+    Writes: MATRIX, RADIAL_RISE, FREE_RISE.
     """
     p = elbows.size
     for j in range(p):
-        friction_response(ws, shared, lanes, elbows[j], j)
+        friction_response(ws, shared, lanes, tip, elbows[j], j)
     for j in range(p):
         for k in range(lanes):
             shared[FREE_RISE + U(j * W) + k] = shared[FORCES + U(j * W) + k]
@@ -66,13 +71,50 @@ def friction_coupling(ws, shared, lanes, elbows):
             symmetric = U((max(i, j) * MAXIMUM_ELBOWS + min(i, j)) * W)
             for k in range(lanes):
                 shared[MATRIX + entry + k] = shared[symmetric + k]
-                shared[COUPLING + entry + k] = 0.0
+                shared[RADIAL_RISE + entry + k] = 0.0
             for a in range(1, min(elbows[i], elbows[j]) - 1):
                 record = U(a * STRIDE)
                 for k in range(lanes):
                     here = record + k
                     answer = ws[here + U(Y + i * W)]
-                    shared[COUPLING + entry + k] += ws[here + D] * answer * ws[here + U(X + j * W)]
+                    shared[RADIAL_RISE + entry + k] += ws[here + D] * answer * ws[here + U(X + j * W)]
+
+
+@template
+def friction_law(ws, shared, lanes, elbows):
+    """Friction for a newton of each elbow's force, radial and tangential, and what that adds to the matrix.
+
+    It is mu v / sqrt(v^2 + v_s^2) against the sliding velocity v. The speed v_s over which it comes up is ELBOW_SPEED,
+    and more where forces are so large that the friction of a slow elbow, mu f M / v_s times the step with M the
+    mobility, would be beyond what a step resolves: between two links that fold up, elbows push without bound.
+
+    Reads: Q_DOT, RHO, RHO_DOT, ELBOW_FRICTION, FORCES, MOBILITY, STEP, COME_UP, RADIAL_RISE, SLIDE_R.
+    Writes: COME_UP, SLIDE_R, SLIDE_T, COUPLING.
+    """
+    p = elbows.size
+    for k in range(lanes):
+        shared[COME_UP + k] = 0.0
+    for j in range(p):
+        record = U((elbows[j] - 2) * STRIDE)
+        for k in range(lanes):
+            push = ws[record + k + ELBOW_FRICTION] * max(shared[FORCES + U(j * W) + k], 0.0)
+            shared[COME_UP + k] += push * shared[MOBILITY + U(j * W) + k]
+    for k in range(lanes):
+        shared[COME_UP + k] = max(ELBOW_SPEED, shared[COME_UP + k] * shared[STEP + k] / RESOLVED_FRICTION)
+    for j in range(p):
+        record = U((elbows[j] - 2) * STRIDE)
+        for k in range(lanes):
+            here = record + k
+            radial = ws[here + RHO_DOT]
+            tangential = ws[here + RHO] * ws[Q_DOT + k]
+            come_up = shared[COME_UP + k]
+            share = -ws[here + ELBOW_FRICTION] / np.sqrt(radial * radial + tangential * tangential + come_up * come_up)
+            shared[SLIDE_R + U(j * W) + k] = share * radial
+            shared[SLIDE_T + U(j * W) + k] = share * tangential
+        for i in range(p):
+            entry = U((i * MAXIMUM_ELBOWS + j) * W)
+            for k in range(lanes):
+                shared[COUPLING + entry + k] = shared[RADIAL_RISE + entry + k] * shared[SLIDE_R + U(j * W) + k]
 
 
 @template
@@ -97,17 +139,16 @@ def apply_friction(ws, shared, lanes, tip, elbows):
                 shared[FORCES + U(i * W) + k] += shared[COUPLING + entry + k] * shared[PUSH + U(j * W) + k]
     for j in range(p):
         x_slot = U(X + j * W)
-        push = PUSH + U(j * W)
         for a in range(1, elbows[j] - 1):
             record = U(a * STRIDE)
             for k in range(lanes):
                 here = record + k
-                ws[here + R] += ws[here + x_slot] * shared[push + k]
+                ws[here + R] += ws[here + x_slot] * (shared[SLIDE_R + U(j * W) + k] * shared[PUSH + U(j * W) + k])
         record = U((elbows[j] - 2) * STRIDE)
         for k in range(lanes):
             here = record + k
-            radial = shared[SLIDE_R + U(j * W) + k] * shared[push + k]
-            tangential = shared[SLIDE_T + U(j * W) + k] * shared[push + k]
+            radial = shared[SLIDE_R + U(j * W) + k] * shared[PUSH + U(j * W) + k]
+            tangential = shared[SLIDE_T + U(j * W) + k] * shared[PUSH + U(j * W) + k]
             lost = -(radial * ws[here + RHO_DOT] + tangential * ws[here + RHO] * ws[Q_DOT + k])
             ws[here + LOSS] = ws[here + LOSS] + lost if TABLE else lost
             ws[tip + TWIST + k] += tangential * ws[here + RHO]
@@ -130,8 +171,9 @@ def friction_fixed_point(ws, shared, n, elbows):
     if not TABLE:
         for k in range(lanes):
             ws[tip + TWIST + k] = 0.0
-    friction_coupling(ws, shared, lanes, elbows)
+    friction_coupling(ws, shared, lanes, tip, elbows)
     cholesky_solve(shared, lanes, p)
+    friction_law(ws, shared, lanes, elbows)
     for k in range(lanes):
         shared[PUSH_LIMIT + k] = 0.0
     for j in range(p):

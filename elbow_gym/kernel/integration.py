@@ -9,7 +9,7 @@ from elbow_gym.kernel.projection import project
 from elbow_gym.kernel.rows import FREE_DRIFT
 from elbow_gym.kernel.recursion import inward, outward
 from elbow_gym.kernel.slots import (
-    ASTRAY, BELOW, DRIFT, DRIVE, EXPONENTIAL, LANES, LOWEST_FREE, LOWEST_Z, STRIDE, U,
+    ASTRAY, BELOW, DRIFT, DRIVE, EXPONENTIAL, LANES, LOWEST_FREE, LOWEST_Z, RUBBING, STEP, STRIDE, U,
 )  # fmt: skip
 from elbow_gym.kernel.rk4_stages import rk4_first, rk4_fourth, rk4_second, rk4_third
 from elbow_gym.kernel.exponential_stages import (
@@ -35,9 +35,12 @@ def move(ws, shared, n, elbows, steps):
     state of the next one.
 
     Reads: LOWEST_Z, BELOW, DRIFT, ASTRAY.
-    Writes: BELOW, ASTRAY.
+    Writes: BELOW, ASTRAY, STEP.
     """
     tip = U((n - 1) * STRIDE)
+    if RUBBING:
+        for k in range(LANES):
+            shared[STEP + k] = steps[0] if steps.size > 0 else 0.0
     evaluate(ws, shared, n, elbows)
     known = 0.0
     for s in range(steps.size):
@@ -56,6 +59,8 @@ def move(ws, shared, n, elbows, steps):
                 for k in range(LANES):
                     left = shared[DRIFT + k] / step
                     shared[ASTRAY + k] = max(shared[ASTRAY + k], left if left > FREE_DRIFT else 0.0)
+                    if RUBBING:
+                        shared[STEP + k] = steps[min(s + 1, steps.size - 1)]
             # After stage 4 this is the summary of the end of the step, and k_1 of the next.
             evaluate(ws, shared, n, elbows)
 

@@ -75,6 +75,8 @@ MAXIMUM_ELBOWS = 8
 # Friction of a rigid elbow goes with its force up to this many times the largest force without friction: near a pose in
 # which elbow and friction jam, Coulomb's law has no solution, or one without bound.
 LARGEST_AMPLIFICATION = 10.0
+# Largest rate times step [-] of the friction of slow elbows; where it would be faster, it comes up over higher speeds.
+RESOLVED_FRICTION = 2.0
 # Mean vertical acceleration [m/s^2] that a step may leave an elbow with, for the projection to take. The paper's arm
 # has at most 2; with more, near poses in which elbows cannot move against each other, energy is wrong.
 FREE_DRIFT = 100.0

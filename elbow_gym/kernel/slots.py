@@ -169,17 +169,22 @@ ACTIVE = SHIFT + U(W)  # 1 while the projection goes on
 DRIFT = ACTIVE + U(W)  # largest vertical speed of an elbow after a step, which the projection takes [m/s]
 ASTRAY = DRIFT + U(W)  # largest vertical acceleration of an elbow that its force or its step left [m/s^2]
 PLAIN_SHARED_ROWS = W * (_MATRIX + MAXIMUM_ELBOWS + 5)
-# Where elbows rub: the matrix again, what friction adds to it [1/kg], the free accelerations [m/s^2], friction per
-# newton of each elbow's force, radial and tangential [-], 1 for the elbows that push, and how hard they do [N].
+# Where elbows rub: the matrix again, what friction adds to it and what a radial newton would [1/kg], the free
+# accelerations [m/s^2], each elbow's mobility [1/kg], friction per newton of its force, radial and tangential [-], 1
+# for the elbows that push, and how hard they do [N].
 MATRIX = U(PLAIN_SHARED_ROWS)
 COUPLING = MATRIX + U(W * _MATRIX)
-FREE_RISE = COUPLING + U(W * _MATRIX)
-SLIDE_R = FREE_RISE + U(W * MAXIMUM_ELBOWS)
+RADIAL_RISE = COUPLING + U(W * _MATRIX)
+FREE_RISE = RADIAL_RISE + U(W * _MATRIX)
+MOBILITY = FREE_RISE + U(W * MAXIMUM_ELBOWS)
+SLIDE_R = MOBILITY + U(W * MAXIMUM_ELBOWS)
 SLIDE_T = SLIDE_R + U(W * MAXIMUM_ELBOWS)
 PUSHING = SLIDE_T + U(W * MAXIMUM_ELBOWS)
 PUSH = PUSHING + U(W * MAXIMUM_ELBOWS)
 PUSH_LIMIT = PUSH + U(W * MAXIMUM_ELBOWS)  # the largest push that friction goes with [N]
-SHARED_ROWS = W * (3 * _MATRIX + 6 * MAXIMUM_ELBOWS + 6)
+COME_UP = PUSH_LIMIT + U(W)  # speed over which friction comes up [m/s]
+STEP = COME_UP + U(W)  # length of the step that the evaluation is for [s]
+SHARED_ROWS = W * (4 * _MATRIX + 7 * MAXIMUM_ELBOWS + 8)
 
 
 def offsets(

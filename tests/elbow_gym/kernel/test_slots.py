@@ -18,7 +18,7 @@ from elbow_gym.table import TableParameters
 FIXED = {"U", "LANES", "NEXT", "W", "STRIDE", "BLOCK_LANES"}
 SHARED = {
     "FORCES", "BELOW", "SHIFT", "ACTIVE", "MATRIX", "COUPLING", "FREE_RISE", "SLIDE_R", "SLIDE_T", "PUSHING", "PUSH",
-    "PUSH_LIMIT", "DRIFT", "ASTRAY",
+    "PUSH_LIMIT", "DRIFT", "ASTRAY", "RADIAL_RISE", "MOBILITY", "COME_UP", "STEP",
 }  # fmt: skip
 SLOTS = {name for name, value in vars(slots).items() if isinstance(value, np.uint64)} - FIXED | {"X", "Y"}
 
