@@ -5,7 +5,8 @@ depends on the mechanism and the integrator. For every joint let J = k^2 I_m, D 
 K = K_m, a = R / L and w = K / sqrt(J L). In M^(1/2) q_dot and L^(1/2) i, arm and motors are damping plus a skew
 coupling, and in relative angles the mass matrix is nowhere less than the rotors' J. So for every pose and any elbows
 
-    armature       R / L of the winding where R_th V0^2 / R warms it, and the supply's rate
+    armature       R / L of the winding where R_th V0^2 / R warms it, for no longer than the arm runs, and the supply's
+                   rate
     supply         R_s times the sum of 1 / L: all currents together make the bus sag
     friction       (D + T_c k / GEAR_SPEED) / J, for Coulomb's friction of the gear comes up over that speed
     coupling       w
@@ -105,6 +106,7 @@ def rates(
     *,
     elbows: bool = True,
     start: Start | None = None,
+    duration: float = math.inf,
 ) -> dict[str, float]:
     """The fastest rates [1/s], by the names of `MECHANISMS`; zero where a mechanism is off.
 
@@ -116,6 +118,7 @@ def rates(
         supply_voltage: V0 of each arm [V], shape (...); the conditions' own when None.
         elbows: whether there are rigid ones.
         start: the states that the arms are put in; at rest and cold when None.
+        duration: time that the arms run [s].
     """
     every = rows.reshape(-1, *rows.shape[-2:])
     low, high = _by_name(every.min(axis=0)), _by_name(every.max(axis=0))
@@ -124,7 +127,7 @@ def rates(
     given, rise = (np.zeros(n), np.zeros(n)) if start is None else _fastest_and_warmest(start, low, high, volts)
     # What overflows is too fast for any step.
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        found = _motor_rates(low, high, conditions.supply_resistance) | _heat_rates(low, high, volts, rise)
+        found = _motor_rates(low, high, conditions.supply_resistance) | _heat_rates(low, high, volts, rise, duration)
         speed = np.maximum(_free_speeds(low, high, volts), given)
         found |= _motion_rates(every, low, high, speed) | _contact_rates(every, low, high, speed, volts)
     found["armature"] += found["supply"]
@@ -188,14 +191,18 @@ def _fastest_and_warmest(start: Start, low: Ends, high: Ends, volts: float) -> t
     return speed / OVERSHOOT, start.temperature_rise.max(axis=0) + high["heating"] * stored / 2.0
 
 
-def _heat_rates(low: Ends, high: Ends, volts: float, rise: Array) -> dict[str, float]:
+def _heat_rates(low: Ends, high: Ends, volts: float, rise: Array, duration: float) -> dict[str, float]:
     resistance, inverse_inductance = high["armature_resistance"], high["inverse_inductance"]
     growth = high["temperature_coefficient"] * high["heating"] * volts**2
     fed_back = np.sqrt(2.0 * inverse_inductance * growth)
-    # At rest under V0 the rise T settles where R (1 + alpha T) T = R_th V0^2.
+    # At rest under V0 the rise T settles where R (1 + alpha T) T = R_th V0^2, and comes to (1 + alpha T)^2 =
+    # (1 + alpha T_0)^2 + 2 growth t / R after a time t in which nothing cools.
     over_cooling = np.divide(growth, low["cooling"], out=np.zeros_like(growth), where=low["cooling"] > 0.0)
     settled = (1.0 + np.sqrt(1.0 + 4.0 * over_cooling / resistance)) / 2.0
-    warmest = np.maximum(settled, 1.0 + high["temperature_coefficient"] * rise)
+    first = 1.0 + high["temperature_coefficient"] * rise
+    # Nothing grows in a time without end where there is no heat.
+    reached = np.sqrt(first**2 + np.where(growth > 0.0, 2.0 * growth * duration / low["armature_resistance"], 0.0))
+    warmest = np.maximum(first, np.minimum(settled, reached))
     return {
         "armature": float((resistance * warmest * inverse_inductance).max()),
         "cooling": float(high["cooling"].max()),

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elbow_gym.checks import LARGEST_INTEGER, non_negative, one_of, positive
 from elbow_gym.parameters import ARM_SUFFIX, ArmParameters, Array, as_arm, as_elbows
@@ -148,7 +149,7 @@ class Settings:
             start: what moves or is warm in their states; nothing when None.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            found = rates(rows, self.conditions, volts, elbows=bool(self.elbow_joints), start=start)
+            found = self._rates(rows, volts, start)
         check_option(option, float(self.substeps.max()), found, self.integrator)
 
     def _shortest_arm(self) -> ArmParameters:
@@ -194,6 +195,8 @@ class Settings:
             "control_frequency": self.control_frequency,
             "timestep": self.timestep,
             "integrator": self.integrator,
+            # Classical steps are short enough for windings as warm as an episode makes them.
+            "duration": self.duration if self.heat and self.integrator == "rk4" else None,
             "action_unit": self.action_unit,
             "table": conditions.surface,
             "voltage_limit": conditions.supply_voltage,
@@ -224,7 +227,11 @@ class Settings:
         """Fastest rates of any arm that may be drawn [1/s], by the names of `rates.MECHANISMS`."""
         arm, ranges = self.parsed_arm, self.randomization.ranges
         rows, volts = worst_rows(quantities(arm), arm.gravity, self.conditions, ranges)
-        return rates(rows, self.conditions, volts, elbows=bool(self.elbow_joints))
+        return self._rates(rows, volts)
+
+    def _rates(self, rows: Array, volts: ArrayLike, start: Start | None = None) -> dict[str, float]:
+        elbows = bool(self.elbow_joints)
+        return rates(rows, self.conditions, volts, elbows=elbows, start=start, duration=self.duration)
 
     @property
     def horizon(self) -> int:

@@ -11,6 +11,8 @@ from gymnasium.utils.env_checker import data_equivalence
 
 from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, Simulator, paper_arm
 from elbow_gym.kernel.build import kernel
+from elbow_gym.task.saved_state import check_basis
+from elbow_gym.task.settings import Settings
 
 RANDOM = {
     "randomize": {"mass": [0.8, 1.2], "sensor_noise": [0.01, 0.02], "action_delay": [0, 2], "length": [0.95, 1.05]},
@@ -128,6 +130,13 @@ def test_a_state_of_other_settings_is_refused(other, message):
     env = played(ElbowArmEnv())
     with pytest.raises(ValueError, match=f"^state must be of an environment with {message}"):
         env.set_state(ElbowArmEnv(**other).get_state())
+
+
+def test_classical_steps_are_not_given_windings_of_a_longer_episode():
+    warm = Settings(heat=True, integrator="rk4").basis
+    check_basis(warm, {**warm})
+    with pytest.raises(ValueError, match=r"^state must be of an environment with the same duration, 5.0, got 500.0$"):
+        check_basis(warm, Settings(heat=True, integrator="rk4", duration=500.0).basis)
 
 
 def test_prices_starts_and_durations_may_differ():

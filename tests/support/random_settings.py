@@ -1,11 +1,13 @@
-"""Random settings of the environment: constants over decades, every switch, ranges and a reset's own parameters."""
+"""Random settings of the environment: constants over decades, every switch, ranges, a reset's parameters and state."""
 
 import dataclasses
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from elbow_gym import ArmParameters, LinkParameters, MotorParameters, paper_arm
+from elbow_gym import ArmParameters, LinkParameters, MotorParameters, Simulator, paper_arm
+from elbow_gym.kernel.rows import PARAMETERS
 
 LINK = {"mass": 0.1, "length": 0.3, "radius": 0.01}
 MOTOR = {
@@ -96,3 +98,24 @@ def _pose(rng: np.random.Generator, length: np.ndarray, elbows: tuple[int, ...])
         height += length[a] * np.cos(pitch[a])
     pitch[0] = 0.0
     return (float(rng.uniform(-1.0, 1.0)), *np.diff(pitch).tolist())
+
+
+def draw_state(rng: np.random.Generator, simulator: Simulator) -> dict[str, np.ndarray]:
+    """A reset's state for the simulator's one arm: a pose near the present one, speeds, currents and warm windings.
+
+    Speeds and currents are over two and a half decades, up to three times the free speed and the stalled current.
+    """
+    row = dict(zip(PARAMETERS, simulator.parameters(np.array([0]))[0], strict=True))
+    q, n, volts = simulator.q[0].copy(), simulator.arm.n_joints, simulator.conditions.supply_voltage
+    noise = rng.choice([0.0, 0.05, 0.3]) * rng.normal(size=n)
+    with suppress(ValueError):
+        q = simulator.on_table(q + noise)[0]
+    # Heights of the elbows by the joints: each link turns with all joints before its end.
+    slope = -row["length"] * np.sin(np.cumsum(np.concatenate([[0.0], q[1:]])))
+    rise = np.array([np.cumsum((slope * (np.arange(n) < elbow - 1))[::-1])[::-1] for elbow in simulator.elbows])
+    rise = rise.reshape(-1, n) * (np.arange(n) > 0)
+    speed = rng.normal(size=n) * 10.0 ** rng.uniform(-2.0, 0.5) * volts / row["joint_torque_constant"]
+    current = rng.normal(size=n) * 10.0 ** rng.uniform(-2.0, 0.5) * volts / row["armature_resistance"]
+    warm = rng.uniform(size=n) * 10.0 ** rng.uniform(0.0, 2.5)
+    state = {"q": q, "q_dot": speed - np.linalg.pinv(rise) @ (rise @ speed), "current": current}
+    return {**state, "temperature_rise": warm} if simulator.conditions.heat else state

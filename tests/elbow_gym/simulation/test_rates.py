@@ -19,9 +19,9 @@ ELBOWS = ((), (4,), (4, 7))
 STIFF = {"stiffness": 1e5}
 
 
-def rates_of(arm, elbows=True, start=None, **conditions):
+def rates_of(arm, elbows=True, start=None, duration=math.inf, **conditions):
     under = Conditions(**conditions)
-    return rates(parameter_table(arm, under), under, elbows=elbows, start=start)
+    return rates(parameter_table(arm, under), under, elbows=elbows, start=start, duration=duration)
 
 
 def paper_with(**motor):
@@ -188,6 +188,15 @@ def test_a_stalled_winding_warms_up_within_its_rates(heat_capacity, inductance):
     resistance = 1.1 * (1.0 + 0.00393 * rise)
     np.testing.assert_allclose(slope(np.array([24.0 / resistance, rise])), 0.0, atol=1e-9 / inductance)
     assert rate["armature"] == pytest.approx(resistance / inductance)
+    # In five seconds it comes near that where it holds little heat, else near what heat makes of it that never leaves.
+    warming = solve_ivp(
+        lambda _, x: motors.temperature_rate(arm, 24.0 / motors.armature_resistance(arm, x)[:1], x)[:1],
+        (0.0, 5.0),
+        [0.0],
+    )
+    reached = motors.armature_resistance(arm, warming.y[:, -1])[0] / inductance
+    assert 0.95 * rates_of(arm, heat=True, duration=5.0)["armature"] < reached
+    assert reached <= rates_of(arm, heat=True, duration=5.0)["armature"] <= rate["armature"]
 
 
 def test_a_link_struck_at_its_end_swings_at_the_tables_rate():
@@ -348,6 +357,10 @@ def test_a_start_counts_with_its_speed_its_current_and_its_warmth_beyond_those_o
     assert driven["speed"] == pytest.approx(9.0 * math.sqrt(0.0017 / (0.000164 * 9.0)) * 1e3 / 3.0)
     hot = rates_of(arm, heat=True, start=start_of(rise=1e4))
     assert hot["armature"] == pytest.approx(1.1 * (1.0 + 0.00393 * 1e4) / 0.0017)
+    # A second more of 24^2 V^2 / R in 20 J/K, at a resistance that grows.
+    warmer = rates_of(arm, heat=True, start=start_of(rise=100.0), duration=1.0)["armature"]
+    growth = (0.0017 / 1.1 * warmer) ** 2 - (1.0 + 0.00393 * 100.0) ** 2
+    assert growth == pytest.approx(2.0 * 0.00393 * 24.0**2 / (1.1 * 20.0))
     # Joints that start fast hit the table fast.
     falling = rates_of(arm, table=True, start=start_of(300.0))["dissipation"]
     assert falling > 2.0 * rates_of(arm, table=True)["dissipation"]
