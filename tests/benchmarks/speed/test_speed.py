@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from gymnasium.utils import performance
 
 from benchmarks.speed import environments, markdown, peers
 from benchmarks.speed import own as contenders
@@ -49,6 +50,9 @@ def no_peers(monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(
+    not hasattr(performance, "benchmark_vector_step"), reason="this Gymnasium has no benchmark_vector_step"
+)
 @pytest.mark.usefixtures("quick_starts", "small_batches", "no_batch_of_rk4", "no_peers")
 def test_quick_run_writes_all_own_rows_and_names_missing_peers(tmp_path, capsys, monkeypatch):
     # Copies in processes of their own are slow to start, and Gymnasium's business.
