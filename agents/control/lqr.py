@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.control.expansion import MeanPower, riccati, tracking
 from agents.control.trajectory import Trajectory
 from elbow_gym.interface import Environment, Interface
-from elbow_gym.kinematics import constraint_jacobian, hand_position
+from elbow_gym.kinematics import constraint_jacobian
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.settings import Settings
 
@@ -21,6 +22,8 @@ SMOOTHING = 0.002
 """Length that smooths the tracking error e to sqrt(e^2 + SMOOTHING^2) [m], whose curvature is finite on the target."""
 STIFFNESS = 1e-3
 """Cost of a joint's deviation from the trajectory [1/rad^2], which the hand alone would leave free."""
+TOGETHER = 256
+"""Most control periods that are linearised in one batch."""
 
 
 class TimeVaryingLQR:
@@ -43,8 +46,7 @@ class TimeVaryingLQR:
         horizon = self._interface.horizon
         if len(trajectory.voltage) != horizon:
             raise ValueError(f"trajectory must have {horizon} control periods, got {len(trajectory.voltage)}")
-        self._states = np.concatenate([trajectory.q, trajectory.q_dot, trajectory.current], axis=-1)
-        self._voltage = trajectory.voltage
+        self._states, self._voltage = trajectory.states, trajectory.voltage
         self.gains = lqr_gains(self._interface.settings, trajectory)
         self._period = 0
 
@@ -64,71 +66,65 @@ class TimeVaryingLQR:
         self._period = 0
 
 
-def linearised_periods(settings: Settings, trajectory: Trajectory) -> tuple[Array, Array]:
-    """Slopes of x_(k+1) in x_k, (N, 3n, 3n), and in v_k, (N, 3n, n), by central differences of the simulator.
+class Linearisation:
+    """Slopes of a control period by central differences of the simulator, all periods of a trajectory in one batch.
 
-    Deviations of the pose and the rates are projected onto the elbows' plane before they are applied.
+    Args:
+        settings: the environment.
+        periods: control periods of the trajectories.
     """
-    arm, elbows, n = settings.parsed_arm, settings.elbow_joints, settings.parsed_arm.n_joints
-    size = 4 * n
-    nudge = np.concatenate([np.eye(size), -np.eye(size)]) * STEP
-    steps = settings.substeps
-    step, conditions = float(steps.min()), settings.conditions
-    simulator = Simulator(arm, elbows, 2 * size, conditions=conditions, timestep=step, integrator=settings.integrator)
-    states, inputs = [], []
-    for q, q_dot, current, voltage in zip(
-        trajectory.q[:-1], trajectory.q_dot[:-1], trajectory.current[:-1], trajectory.voltage, strict=True
-    ):
-        poses, rates = q + nudge[:, :n], q_dot + nudge[:, n : 2 * n]
-        if elbows:
+
+    def __init__(self, settings: Settings, periods: int) -> None:
+        arm, self._steps, n = settings.parsed_arm, settings.substeps, settings.parsed_arm.n_joints
+        self._n, self._periods, self._together = n, periods, min(periods, TOGETHER)
+        self._nudge = np.concatenate([np.eye(4 * n), -np.eye(4 * n)]) * STEP
+        self._simulator = Simulator(
+            arm,
+            settings.elbow_joints,
+            self._together * len(self._nudge),
+            conditions=settings.conditions,
+            timestep=float(self._steps.min()),
+            integrator=settings.integrator,
+        )
+
+    def __call__(self, states: Array, voltage: Array) -> tuple[Array, Array]:
+        """Slopes of x_(k+1) in x_k, (N, 3n, 3n), and in v_k, (N, 3n, n).
+
+        Deviations of the pose and the rates are projected onto the elbows' plane before they are applied.
+
+        Args:
+            states: (q, q_dot, current) at the starts of the periods, (N, 3n).
+            voltage: terminal voltages [V], (N, n).
+        """
+        n, size = self._n, 4 * self._n
+        slopes = np.empty((self._periods, 3 * n, size))
+        # The last batch overlaps the one before where the periods do not divide evenly.
+        for first in (*range(0, self._periods - self._together, self._together), self._periods - self._together):
+            chosen = slice(first, first + self._together)
+            after = self._after(states[chosen], voltage[chosen])
+            slopes[chosen] = np.swapaxes(after[:, :size] - after[:, size:], 1, 2) / (2.0 * STEP)
+        return slopes[..., : 3 * n], slopes[..., 3 * n :]
+
+    def _after(self, states: Array, voltage: Array) -> Array:
+        n, simulator = self._n, self._simulator
+        both = np.concatenate([states, voltage], axis=-1)[:, None] + self._nudge
+        poses, rates, current, volts = np.split(both.reshape(-1, 4 * n), 4, axis=-1)
+        if simulator.elbows:
             poses = simulator.on_table(poses)
-            jacobians = constraint_jacobian(arm, poses, elbows)
-            for k, (jacobian, inverse) in enumerate(zip(jacobians, np.linalg.pinv(jacobians), strict=True)):
-                rates[k] -= inverse @ (jacobian @ rates[k])
-        simulator.reset(poses, rates, current + nudge[:, 2 * n : 3 * n])
-        simulator.advance(voltage + nudge[:, 3 * n :], steps)
+            jacobian = constraint_jacobian(simulator.arm, poses, simulator.elbows)
+            rates = rates - (np.linalg.pinv(jacobian) @ (jacobian @ rates[..., None]))[..., 0]
+        simulator.reset(poses, rates, current)
+        simulator.advance(np.ascontiguousarray(volts), self._steps)
         after = np.concatenate([simulator.q, simulator.q_dot, simulator.current], axis=-1)
-        slope = ((after[:size] - after[size:]) / (2.0 * STEP)).T
-        states.append(slope[:, : 3 * n])
-        inputs.append(slope[:, 3 * n :])
-    return np.stack(states), np.stack(inputs)
+        return after.reshape(len(states), len(self._nudge), 3 * n)
 
 
 def lqr_gains(settings: Settings, trajectory: Trajectory) -> Array:
     """Gains K_k [V/rad, V s/rad, V/A], (N, n, 3n), of the backward Riccati recursion along a trajectory."""
-    arm, n = settings.parsed_arm, settings.parsed_arm.n_joints
-    periods, h = len(trajectory.voltage), settings.control_period
-    A, B = linearised_periods(settings, trajectory)
-    resistance, weight = arm.of_motors("armature_resistance"), settings.energy_weight
-    # Mean power v (v h - K_m dq - L di) / (R h): its slope in the change of state.
-    change = np.zeros((n, 3 * n))
-    change[:, :n] = np.diag(arm.of_motors("joint_torque_constant"))
-    change[:, 2 * n :] = np.diag(arm.of_motors("armature_inductance"))
-    change /= h
-    circle = settings.parsed_circle
-    target = circle.position(circle.angle(h * np.arange(1, periods + 1), float(circle.phase)))
-    gains, P = np.empty((periods, n, 3 * n)), np.zeros((3 * n, 3 * n))
-    for k in range(periods - 1, -1, -1):
-        P = P + _tracking_curvature(settings, trajectory.q[k + 1], target[k])
-        price = (weight / resistance)[:, None]
-        effort = price * (np.eye(n) - change @ B[k])
-        effort = effort + effort.T + B[k].T @ P @ B[k]
-        cross = -price * (change @ (A[k] - np.eye(3 * n))) + B[k].T @ P @ A[k]
-        gains[k] = np.linalg.solve(effort, cross)
-        P = A[k].T @ P @ A[k] - cross.T @ gains[k]
-        P = (P + P.T) / 2.0
-    return gains
-
-
-def _tracking_curvature(settings: Settings, q: Array, target: Array) -> Array:
-    """Second derivative of the tracking cost in the state, (3n, 3n), without the curvature of the hand's path."""
-    arm, n = settings.parsed_arm, settings.parsed_arm.n_joints
-    nudge = np.concatenate([np.eye(n), -np.eye(n)]) * STEP
-    hand = hand_position(arm, q + nudge)
-    jacobian = ((hand[:n] - hand[n:]) / (2.0 * STEP)).T
-    error = hand_position(arm, q) - target
-    distance = np.sqrt(error @ error + SMOOTHING**2)
-    curvature = np.zeros((3 * n, 3 * n))
-    inner = np.eye(3) / distance - np.outer(error, error) / distance**3
-    curvature[:n, :n] = settings.tracking_weight * (jacobian.T @ inner @ jacobian + STIFFNESS * np.eye(n))
-    return curvature
+    periods, circle = len(trajectory.voltage), settings.parsed_circle
+    slopes = Linearisation(settings, periods)(trajectory.states[:-1], trajectory.voltage)
+    instants = settings.control_period * np.arange(1, periods + 1)
+    target = circle.position(circle.angle(instants, float(circle.phase)))
+    curvature = tracking(settings, trajectory.q[1:], target, SMOOTHING)[2]
+    curvature += settings.tracking_weight * STIFFNESS * np.eye(settings.parsed_arm.n_joints)
+    return riccati(slopes, MeanPower(settings), curvature)[1]

@@ -29,6 +29,17 @@ class Trajectory:
     voltage: Array
     """Terminal voltages [V], (N, n)."""
 
+    @property
+    def states(self) -> Array:
+        """(q, q_dot, current) at the ends of the control periods, (N + 1, 3n)."""
+        return np.concatenate([self.q, self.q_dot, self.current], axis=-1)
+
+    @classmethod
+    def from_states(cls, states: Array, voltage: Array) -> Trajectory:
+        """The trajectory of `states` [rad, rad/s, A], (N + 1, 3n), and voltages [V], (N, n)."""
+        q, q_dot, current = np.split(states, 3, axis=-1)
+        return cls(q, q_dot, current, voltage)
+
     def save(self, path: Path) -> None:
         """Writes a compressed .npz without pickles, whole or not at all."""
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}

@@ -22,6 +22,8 @@ LATER = 2.0
 """Time from which the hand is taken to be on its path [s]."""
 STATIONARITY = 0.01
 """Largest entry of the Lagrangian's gradient at the solution."""
+COMPLEMENTARITY = 1e-4
+"""Largest product of a bound's multiplier and the distance from it, as a share of the cost [-]."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,8 @@ class Certificate:
     """Largest entry of the Lagrangian's gradient at the solution on the finest mesh [cost per unit of a variable]."""
     violation: float
     """Largest violation of the program's conditions (N m, m/s, rad, rad/s, V)."""
+    complementarity: float
+    """Largest product of a bound's multiplier and the distance from it [cost]."""
     smoothing: float
     """Smoothing of the tracking error that the solution was found with [m]."""
     mesh_change: float
@@ -121,9 +125,16 @@ def checked(
     """
     if solution.point.multipliers is None:
         raise ValueError("solution must have multipliers, got None")
-    stationarity, violation = program.residuals(solution.point.x, solution.smoothing, solution.point.multipliers)
+    stationarity, violation, complementarity = program.residuals(
+        solution.point.x, solution.smoothing, solution.point.multipliers
+    )
     if stationarity > STATIONARITY:
         raise SolveError(f"the Lagrangian's gradient must be at most {STATIONARITY}, got {stationarity:.3g}")
+    if complementarity > COMPLEMENTARITY * abs(solution.cost):
+        raise SolveError(
+            f"a bound's multiplier times the distance from it must be at most {COMPLEMENTARITY:g} of the cost "
+            f"{solution.cost:.5g}, got {complementarity:.3g}"
+        )
     if abs(solution.cost - coarse_cost) > REFINEMENT * abs(solution.cost):
         raise SolveError(
             f"refining must change the cost by at most {REFINEMENT:.1%}, got {coarse_cost:.5g} -> {solution.cost:.5g}"
@@ -156,6 +167,7 @@ def checked(
     certificate = Certificate(
         stationarity,
         violation,
+        complementarity,
         solution.smoothing,
         abs(solution.cost - coarse_cost) / abs(solution.cost),
         abs(reached - solution.cost) / abs(solution.cost),

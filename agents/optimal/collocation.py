@@ -200,7 +200,7 @@ class Transcription:
     def _parameters(self, smoothing: float) -> list[float]:
         return [smoothing, self.problem.settings.tracking_weight, self.problem.settings.energy_weight]
 
-    def residuals(self, x: Array, smoothing: float, multipliers: Multipliers) -> tuple[float, float]:
+    def residuals(self, x: Array, smoothing: float, multipliers: Multipliers) -> tuple[float, float, float]:
         """How far a point is from meeting the first-order conditions.
 
         Args:
@@ -209,8 +209,9 @@ class Transcription:
             multipliers: as `solve` returns them.
 
         Returns:
-            The largest entry of the Lagrangian's gradient (in units of cost per unit of the variable) and of the
-            violation of conditions and bounds (N m, m/s, rad, rad/s, V).
+            The largest entry of the Lagrangian's gradient (in units of cost per unit of the variable), of the violation
+            of conditions and bounds (N m, m/s, rad, rad/s, V), and of a multiplier times the distance from the bound
+            that it is of [cost].
         """
         p, bounds = self._parameters(smoothing), self._bounds
         slope = np.array(self._derivatives["grad_f"](x, p)[1]).ravel()
@@ -219,7 +220,12 @@ class Transcription:
         values = np.concatenate([x, np.array(conditions).ravel()])
         low = np.concatenate([bounds["lbx"], bounds["lbg"]])
         high = np.concatenate([bounds["ubx"], bounds["ubg"]])
-        return float(np.abs(slope).max()), float(np.maximum(low - values, values - high).max(initial=0.0))
+        prices = np.concatenate(multipliers)
+        with np.errstate(invalid="ignore"):
+            slack = np.where(prices > 0.0, high - values, np.where(prices < 0.0, values - low, 0.0))
+            apart = np.abs(prices * np.where(prices == 0.0, 0.0, slack))
+        violation = np.maximum(low - values, values - high).max(initial=0.0)
+        return float(np.abs(slope).max()), float(violation), float(np.where(low == high, 0.0, apart).max())
 
     def taken_over(self, other: Transcription, x: Array, multipliers: Multipliers) -> tuple[Array, Multipliers]:
         """Variables and multipliers of another mesh's solution of the same problem on this one's points.

@@ -1,4 +1,4 @@
-"""Guesses that a search starts from: smooth motions to postures, and what the simulator makes of a rough solution."""
+"""Guesses that a search starts from: smooth motions to postures, and what the simulator makes of a plan."""
 
 from __future__ import annotations
 
@@ -14,18 +14,13 @@ from agents.control.minimum_jerk import minimum_jerk
 from agents.control.posture import best_postures
 from agents.control.trajectory import Trajectory
 from agents.evaluation.recording import Recording, record
-from agents.optimal.collocation import Transcription
 from agents.optimal.problem import Problem
-from agents.optimal.solution import Progress, solve
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 Array = NDArray[np.float64]
 
-ROUGH_SMOOTHINGS = (0.3, 0.03)
-ROUGH_ITERATIONS = 60
-"""Most iterations with one point in a period, whose smoothings are ROUGH_SMOOTHINGS [m]."""
 REACH_TIME = 1.0
 """Time of a guess from the start to its posture [s]."""
 
@@ -62,21 +57,6 @@ def simulated(problem: Problem, trajectory: Trajectory) -> tuple[Trajectory, Rec
     _, recording = rollout(problem.settings, lambda env: TimeVaryingLQR(env, trajectory))
     states = (recording.q[:, 0], recording.q_dot[:, 0], recording.current[:, 0])
     return Trajectory(*states, recording.voltage[1:, 0]), recording
-
-
-def approach(rough: Transcription, guess: Trajectory, progress: Progress) -> Trajectory:
-    """A better guess, where there is one: solved with one point a period, then played in the simulator.
-
-    One point damps what is fast, so that a far guess converges too, but its cost is some percent off and its states are
-    not the arm's.
-    """
-    if guess.voltage.any():
-        return guess
-    try:
-        return simulated(rough.problem, solve(rough, guess, ROUGH_SMOOTHINGS, progress, ROUGH_ITERATIONS).trajectory)[0]
-    except ArithmeticError as error:
-        progress(str(error))
-        return guess
 
 
 def rollout(settings: Settings, make_controller: Callable[[ElbowArmVectorEnv], Any]) -> tuple[float, Recording]:

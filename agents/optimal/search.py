@@ -1,8 +1,9 @@
 """Bound on the return: the best one that direct transcription finds for an environment, played in the simulator.
 
-Each of several postures gives a solution with two Radau points a period at a large smoothing; the cheapest is followed
-to the smallest smoothing and then solved again with three points. A solved task nearby takes the postures' place. The
-cost that counts is the simulator's: of the planned voltages open loop, and of the plan under the time-varying LQR.
+From each of several motions the simulator descends; the cheapest end is the guess of a program with two Radau points a
+period, which is solved to the smallest smoothing and then again with three points. From a solved task nearby the
+program starts at once, and a farther one is one of the motions. The cost that counts is the simulator's: of the planned
+voltages open loop, and of the plan under the time-varying LQR.
 """
 
 from __future__ import annotations
@@ -10,11 +11,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
+from itertools import islice
 
 from agents.control.trajectory import Trajectory
 from agents.optimal.certificate import Bound, checked
 from agents.optimal.collocation import Transcription
-from agents.optimal.guesses import approach, posture_guesses, simulated
+from agents.optimal.descent import STAGES, Descended, Descent
+from agents.optimal.guesses import posture_guesses, simulated
 from agents.optimal.problem import Problem
 from agents.optimal.solution import SMOOTHINGS, Point, Progress, Solution, SolveError, solve
 from agents.optimal.store import Store
@@ -23,65 +26,70 @@ from elbow_gym.task.settings import Settings
 
 COARSE, FINE = 2, 3
 """Numbers of Radau points in a control period, in the search and in the refinement."""
-CONTINUED_BARRIER = 1e-4
+FOLLOWED = 2
+"""Most descents that are followed to a solution: the second where the first one's program does not converge."""
+NEAR = 1.5
+"""Distance up to which a task is solved from the variables and multipliers of another one."""
+NEIGHBOUR = "neighbour"
+"""Name of the nearest solved task among the guesses."""
+CONTINUED_BARRIER = 1e-5
 """Barrier that a solve from a task nearby starts with."""
-CONTINUED_ITERATIONS = 80
-"""Most iterations at one smoothing from a task nearby: near ones take five to fifteen; where far ones take more than
-this, the postures are the shorter way."""
+CONTINUED_ITERATIONS = 40
+"""Most iterations from a task nearby: near ones take five to fifteen; where far ones take more than this, the descent
+is the shorter way."""
 
 
-def best_solution(
+def descended(
     problem: Problem, guesses: Mapping[str, Trajectory], progress: Progress, parallel: bool = False
-) -> tuple[str, Solution, float]:
-    """The cheapest of the solutions from all guesses at the largest smoothing, with `COARSE` points.
+) -> tuple[dict[str, Descended], float]:
+    """Ends of the descents from all guesses by name, the cheapest first.
+
+    All go through the first stage, and only the cheapest of them through the others.
 
     Returns:
-        Its guess's name, the solution, and the CPU time that other processes took [s].
+        The ends, and the CPU time that other processes took [s].
 
     Raises:
-        SolveError: no guess led to a solution.
+        SolveError: the simulator can follow no guess.
     """
-    found: dict[str, Solution] = {}
     elsewhere = 0.0
     if parallel and len(guesses) > 1:
-        # A rough solve has two smoothings, and one follows.
-        jobs = {name: Job(partial(_search_apart, problem, guess), 3) for name, guess in guesses.items()}
-        results = in_processes(jobs, lambda _: progress("a solve has ended"))
+        jobs = {name: Job(partial(_descend_apart, problem, guess), 1) for name, guess in guesses.items()}
+        results = in_processes(jobs, lambda _: None)
         elsewhere = sum(seconds for _, seconds in results.values())
         answers = {name: answer for name, (answer, _) in results.items()}
     else:
-        answers = {name: _search(problem, guess, partial(_say, progress, name)) for name, guess in guesses.items()}
+        answers = {name: _descend(problem, guess) for name, guess in guesses.items()}
+    found: dict[str, Descended] = {}
     for name, answer in answers.items():
-        if isinstance(answer, Solution):
+        if isinstance(answer, Descended):
+            progress(f"{name}: descended to {answer.cost:.5g}, {answer.depth * 1e3:.2g} mm below the table")
             found[name] = answer
         else:
             progress(f"{name}: {answer}")
     if not found:
-        raise SolveError(f"a guess must lead to a solution, got none from {sorted(guesses)}")
-    best = min(found, key=lambda name: found[name].cost)
-    return best, found[best], elsewhere
+        raise SolveError(f"the simulator must follow a guess, got none of {sorted(guesses)} that it can")
+    order = sorted(found, key=lambda name: found[name].cost)
+    return {name: found[name] for name in order}, elsewhere
 
 
-def _say(progress: Progress, name: str, line: str) -> None:
-    progress(f"{name}: {line}")
-
-
-def _search(problem: Problem, guess: Trajectory, progress: Progress) -> Solution | str:
-    """The solution from one guess, or what went wrong."""
+def _descend(problem: Problem, guess: Trajectory) -> Descended | str:
+    """The end of the first stage from one guess, or what went wrong."""
     try:
-        near = approach(Transcription(problem, 1), guess, progress)
-        return solve(Transcription(problem, COARSE), near, SMOOTHINGS[:1], progress)
-    except SolveError as error:
+        return Descent(problem)(guess, STAGES[:1])
+    except (ArithmeticError, ValueError) as error:
         return str(error)
 
 
-def _search_apart(problem: Problem, guess: Trajectory, tell: Tell) -> tuple[Solution | str, float]:
-    """`_search` in a process of its own, and its CPU time [s]."""
+def _descend_apart(problem: Problem, guess: Trajectory, tell: Tell) -> tuple[Descended | str, float]:
+    """`_descend` in a process of its own, and its CPU time [s]."""
     started = time.process_time()
-    return _search(problem, guess, lambda _: tell(1)), time.process_time() - started
+    answer = _descend(problem, guess)
+    tell(1)
+    return answer, time.process_time() - started
 
 
-def refined(problem: Problem, coarse: Solution, progress: Progress) -> tuple[Transcription, Solution]:
+def refined(coarse: Transcription, solution: Solution, progress: Progress) -> tuple[Transcription, Solution]:
     """The program and the solution on the fine mesh, from variables and multipliers of the coarse one.
 
     Where that does not converge, from the coarse solution as the simulator plays it.
@@ -89,15 +97,15 @@ def refined(problem: Problem, coarse: Solution, progress: Progress) -> tuple[Tra
     Raises:
         SolveError: neither way converged.
     """
-    program, point = Transcription(problem, FINE), coarse.point
+    program, point = Transcription(coarse.problem, FINE), solution.point
     if point.multipliers is None:
-        raise ValueError("coarse must have multipliers, got None")
+        raise ValueError("solution must have multipliers, got None")
     try:
-        taken = program.taken_over(Transcription(problem, COARSE), point.x, point.multipliers)
-        return program, solve(program, Point(*taken), (coarse.smoothing,), progress)
+        taken = program.taken_over(coarse, point.x, point.multipliers)
+        return program, solve(program, Point(*taken), (solution.smoothing,), progress)
     except SolveError as error:
         progress(str(error))
-        return program, solve(program, simulated(problem, coarse.trajectory)[0], SMOOTHINGS, progress)
+        return program, solve(program, simulated(coarse.problem, solution.trajectory)[0], SMOOTHINGS, progress)
 
 
 def certified(
@@ -123,18 +131,33 @@ def certified(
         SolveError: no guess converged, or a check failed, which is named.
     """
     took = _stopwatch()
-    name, found, elsewhere = best_solution(problem, guesses, progress, parallel)
+    ends, elsewhere = descended(problem, guesses, progress, parallel)
     took = partial(took, elsewhere)
-    followed = solve(Transcription(problem, COARSE), found.point, SMOOTHINGS[1:], partial(_say, progress, name))
-    return _finished(problem, followed, name, progress, refine, took), followed
+    program = Transcription(problem, COARSE)
+    failures: list[str] = []
+    for name, end in islice(ends.items(), FOLLOWED):
+        say = partial(_say, progress, name)
+        try:
+            further = Descent(problem)(end.trajectory, STAGES[1:])
+            say(f"descended to {further.cost:.5g}, {further.depth * 1e3:.2g} mm below the table")
+            followed = solve(program, further.trajectory, SMOOTHINGS, say)
+            return _finished(program, followed, name, progress, refine, took), followed
+        except SolveError as error:
+            failures.append(f"{name}: {error}")
+            progress(failures[-1])
+    raise SolveError(f"a guess must lead to a solution, got {'; '.join(failures)}")
 
 
-def continued(problem: Problem, start: Point | Trajectory, name: str, progress: Progress) -> tuple[Bound, Solution]:
+def _say(progress: Progress, name: str, line: str) -> None:
+    progress(f"{name}: {line}")
+
+
+def continued(problem: Problem, start: Point, name: str, progress: Progress) -> tuple[Bound, Solution]:
     """Solves a problem from the solution of another one nearby; arguments, results and errors as in `certified`."""
     took, program = _stopwatch(), Transcription(problem, COARSE)
-    options = {"mu_init": CONTINUED_BARRIER} if isinstance(start, Point) else {}
-    followed = solve(program, start, SMOOTHINGS, partial(_say, progress, name), CONTINUED_ITERATIONS, **options)
-    return _finished(problem, followed, name, progress, True, took), followed
+    say = partial(_say, progress, name)
+    followed = solve(program, start, SMOOTHINGS[-1:], say, CONTINUED_ITERATIONS, CONTINUED_BARRIER)
+    return _finished(program, followed, name, progress, True, took), followed
 
 
 def _stopwatch() -> Callable[..., tuple[float, float]]:
@@ -147,7 +170,7 @@ def _stopwatch() -> Callable[..., tuple[float, float]]:
 
 
 def _finished(
-    problem: Problem,
+    program: Transcription,
     coarse: Solution,
     name: str,
     progress: Progress,
@@ -156,8 +179,8 @@ def _finished(
 ) -> Bound:
     """The bound that a solution with `COARSE` points leads to."""
     if refine:
-        return checked(*refined(problem, coarse, progress), coarse.cost, name, took)
-    return checked(Transcription(problem, COARSE), coarse, coarse.cost, name, took)
+        return checked(*refined(program, coarse, progress), coarse.cost, name, took)
+    return checked(program, coarse, coarse.cost, name, took)
 
 
 def bound(
@@ -172,8 +195,8 @@ def bound(
     """The best known solution of an environment's episode from its start without noise.
 
     A task that was solved before is taken from the store; one that is near to it is solved from there, any other from
-    several postures. It is a local optimum: better ones may exist. The start pose of `start="paper"` is the arm's
-    nominal pose.
+    several postures and the nearest solved task, the shipped optima among them. It is a local optimum: better ones may
+    exist. The start pose of `start="paper"` is the arm's nominal pose.
 
     Args:
         settings: arguments of the environment, without contact, friction, heat, supply resistance and randomisation.
@@ -197,15 +220,17 @@ def bound(
     # The LQR finds its gains with a batch, and one arm plays it.
     compile_before([(settings, 1), settings])
     near = None if fresh else store.nearest(problem)
-    found = None
+    guesses, found = posture_guesses(problem) if near is None or near.distance > NEAR else {}, None
     if near is not None:
         progress(f"nearest solved task: {near.name}, {near.distance:.2g} away")
-        try:
-            found = continued(problem, near.start, "neighbour", progress)
-        except SolveError as error:
-            progress(f"neighbour: {error}")
+        if near.point is not None and near.distance <= NEAR:
+            try:
+                found = continued(problem, near.point, NEIGHBOUR, progress)
+            except SolveError as error:
+                progress(f"{NEIGHBOUR}: {error}")
+        guesses[NEIGHBOUR] = near.trajectory
     if found is None:
-        found = certified(problem, posture_guesses(problem), progress, parallel=parallel)
+        found = certified(problem, guesses, progress, parallel=parallel)
     answer, coarse = found
     if known is not None and known.cost <= answer.cost:
         return known

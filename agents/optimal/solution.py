@@ -13,12 +13,12 @@ from agents.optimal.collocation import Multipliers, Transcription
 
 Array = NDArray[np.float64]
 
-SMOOTHINGS = (0.03, 0.01, 0.003, 0.001)
+SMOOTHINGS = (0.01, 0.003, 0.001)
 """Lengths over which the tracking error is smoothed, one after the other [m].
 
 A third at a time: from 30 to 3 mm at once takes a hundred iterations instead of ten.
 """
-ITERATIONS = 250
+ITERATIONS = 150
 """Most iterations at one smoothing."""
 # A point where nothing moves any more is as good as a KKT point to eight digits: the cost is flat in the posture.
 ACCEPTABLE = {
@@ -28,6 +28,12 @@ ACCEPTABLE = {
     "acceptable_obj_change_tol": 1e-4,
     "acceptable_iter": 5,
 }
+LOOSE = 1e-2
+"""Tolerance of a solution that is but the next one's guess."""
+LEAST_BARRIER = 1e-6
+"""Weight of the barrier from which a solve starts at least [cost]."""
+# As IPOPT's own plan ends, the barrier falls faster than far solutions follow: their steps become tiny.
+BARRIER = {"mu_linear_decrease_factor": 0.3, "mu_superlinear_decrease_power": 1.2}
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 Progress = Callable[[str], None]
@@ -82,9 +88,11 @@ def solve(
     smoothings: Sequence[float] = SMOOTHINGS,
     progress: Progress = lambda _: None,
     max_iter: int = ITERATIONS,
-    **options: float,
+    barrier: float | None = None,
 ) -> Solution:
     """IPOPT at one smoothing after the other; a smaller one that fails leaves the solution of the one before.
+
+    The barrier falls with the smoothing, to zero at the last one: between them a solution is but the next one's guess.
 
     Args:
         program: program to solve.
@@ -92,31 +100,48 @@ def solve(
         smoothings: lengths over which the tracking error is smoothed [m], one after the other.
         progress: called with a line on every smoothing.
         max_iter: most iterations at one smoothing.
-        options: options of IPOPT at the first smoothing.
+        barrier: weight of the barrier at the first smoothing [cost]; one that fits the guess when None.
 
     Raises:
         SolveError: the first smoothing did not converge.
     """
+    if not smoothings:
+        raise ValueError("smoothings must have at least one length, got none")
     point = guess if isinstance(guess, Point) else Point(variables(program, guess))
-    if isinstance(guess, Trajectory) and guess.voltage.any():
-        # What the simulator made is nearly feasible: the barrier need not push it away from its bounds first.
-        options = {"mu_init": 1e-3, "bound_push": 1e-4, "bound_frac": 1e-4, **options}
-    reached = None
-    for smoothing in smoothings:
+    feasible = isinstance(guess, Trajectory) and bool(guess.voltage.any())
+    if barrier is None:
+        barrier = 1e-6 if point.multipliers is not None else 1e-3 if feasible else 0.1
+    # What the simulator made is nearly feasible: the barrier need not push it away from its bounds first.
+    options = {"bound_push": 1e-4, "bound_frac": 1e-4} if feasible else {}
+
+    def step(smoothing: float, start: float, end: float, **more: float) -> str:
+        nonlocal point, barrier
+        loose = {"mu_target": end, "tol": LOOSE} if end > 0.0 else {}
         x, multipliers, stats = program.solve(
-            point.x, smoothing, point.multipliers, max_iter=max_iter, **{**ACCEPTABLE, **options}
+            point.x,
+            smoothing,
+            point.multipliers,
+            **{**ACCEPTABLE, **BARRIER, "mu_init": start, "max_iter": max_iter, **loose, **more},
         )
-        options = {}
         status = str(stats["return_status"])
         progress(f"smoothing {smoothing * 1e3:g} mm, {stats['iter_count']} iterations: {status}")
+        if status in SOLVED:
+            point, barrier = Point(x, multipliers), max(end, LEAST_BARRIER)
+        return status
+
+    reached = None
+    for smoothing in smoothings:
+        last = smoothing == smoothings[-1]
+        status = step(smoothing, barrier, 0.0 if last else max(barrier / 10.0, LEAST_BARRIER), **options)
+        options = {}
         if status not in SOLVED:
-            if reached is None:
-                raise SolveError(f"IPOPT must converge at a smoothing of {smoothing} m, got {status}")
+            if reached is not None:
+                status = step(reached, barrier, 0.0)
+            if status not in SOLVED:
+                raise SolveError(f"IPOPT must converge at a smoothing of {reached or smoothing} m, got {status}")
             break
-        point, reached = Point(x, multipliers), smoothing
-    if reached is None:
-        raise ValueError("smoothings must have at least one length, got none")
-    return Solution(trajectory_of(program, point.x), program.cost(point.x), point, reached)
+        reached = smoothing
+    return Solution(trajectory_of(program, point.x), program.cost(point.x), point, reached or smoothings[0])
 
 
 def trajectory_of(program: Transcription, x: Array) -> Trajectory:

@@ -12,11 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agents.control.trajectory import Trajectory
 from agents.files import write_text, write_whole
 from agents.optimal.problem import Problem
 from agents.optimal.solution import Point
+from agents.shipped import OPTIMA
+from elbow_gym.task.settings import Settings
 
 STORE = Path(__file__).parents[2] / ".benchmarks" / "bounds"
 """Folder of the solved tasks; ignored by git."""
@@ -36,11 +39,13 @@ class Neighbour:
     """A solved task to start from."""
 
     name: str
-    """Key of the task in the store."""
+    """Key of the task in the store, or name of the shipped optimum."""
     distance: float
     """Sum of its differences in units of `SCALES` [-]."""
-    start: Point
-    """Variables and multipliers of its program."""
+    trajectory: Trajectory
+    """Its solution in the simulator."""
+    point: Point | None
+    """Variables and multipliers of its program; None where another version solved it."""
 
 
 @dataclass(frozen=True)
@@ -73,36 +78,52 @@ class Store:
         write_text(card, json.dumps(plain, indent=2) + "\n")
 
     def nearest(self, problem: Problem) -> Neighbour | None:
-        """The nearest task with the problem's arm, elbows, supply and periods within `FARTHEST`, or None."""
-        found = min(self._distances(problem), default=None)
+        """The nearest task with the problem's arm, elbows, supply and periods within `FARTHEST`, or None.
+
+        The shipped optima count, too.
+        """
+        found = min(self._distances(problem), key=lambda one: one[:2], default=None)
         if found is None or found[0] > FARTHEST:
             return None
-        distance, name = found
-        with np.load(self._files(name)[1], allow_pickle=False) as arrays:
+        distance, name, path, own = found
+        if not own:
+            # Another version's solution is but a motion: its variables may mean something else.
+            return Neighbour(name, distance, Trajectory.load(path, beside=BESIDE), None)
+        with np.load(path, allow_pickle=False) as arrays:
             point = Point(arrays["x"], (arrays["bound_multipliers"], arrays["multipliers"]))
-        return Neighbour(name, distance, point)
+        return Neighbour(name, distance, Trajectory.load(path, beside=BESIDE), point)
 
-    def _distances(self, problem: Problem) -> Iterator[tuple[float, str]]:
-        wanted = problem.question
+    def _distances(self, problem: Problem) -> Iterator[tuple[float, str, Path, bool]]:
+        """Distance, name and file of every task with the problem's frame, and whether this version solved it."""
+        frame = json.loads(json.dumps(problem.frame))
         for card in sorted(self.folder.glob("*.json")):
             plain, path = json.loads(card.read_text(encoding="utf-8")), self._files(card.stem)[1]
             asked = plain["problem"]
-            same = all(asked.get(name) == value for name, value in json.loads(json.dumps(problem.frame)).items())
-            # Another version's solution answers no question, and its variables may mean something else.
-            if not same or plain["sources"] != sources() or not path.is_file():
-                continue
-            with np.load(path, allow_pickle=False) as arrays:
-                apart = float(np.sqrt(((arrays["target"] - problem.target) ** 2).sum(axis=-1).mean()))
-            differences = {
-                "target": apart,
-                "start": float(np.abs(np.array(asked["start"]) - problem.start).max()),
-                "payload": abs(asked["payload"] - wanted["payload"]),
-                "weight": abs(_relative_weight(asked) - _relative_weight(wanted)),
-            }
-            yield sum(value / SCALES[name] for name, value in differences.items()), card.stem
+            if all(asked.get(name) == value for name, value in frame.items()) and path.is_file():
+                with np.load(path, allow_pickle=False) as arrays:
+                    target = arrays["target"]
+                yield _distance(problem, asked, target), card.stem, path, plain["sources"] == sources()
+        for card in sorted(OPTIMA.glob("*.json")):
+            arguments = json.loads(card.read_text(encoding="utf-8"))["problem"]
+            above_table = arguments.pop("above_table")
+            solved, path = Problem(Settings(**arguments), above_table), card.with_suffix(".npz")
+            if json.loads(json.dumps(solved.frame)) == frame and path.is_file():
+                yield _distance(problem, solved.question, solved.target), card.stem, path, False
 
     def _files(self, key: str) -> tuple[Path, Path]:
         return self.folder / f"{key}.json", self.folder / f"{key}.npz"
+
+
+def _distance(problem: Problem, asked: dict[str, Any], target: NDArray[np.float64]) -> float:
+    """Sum of the differences to a solved task, its question and its targets [m], (N, 3), in units of `SCALES`."""
+    wanted = problem.question
+    differences = {
+        "target": float(np.sqrt(((target - problem.target) ** 2).sum(axis=-1).mean())),
+        "start": float(np.abs(np.array(asked["start"]) - problem.start).max()),
+        "payload": abs(asked["payload"] - wanted["payload"]),
+        "weight": abs(_relative_weight(asked) - _relative_weight(wanted)),
+    }
+    return sum(value / SCALES[name] for name, value in differences.items())
 
 
 def _relative_weight(question: dict[str, Any]) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from agents.control import lqr
-from agents.control.lqr import TimeVaryingLQR, linearised_periods, lqr_gains
+from agents.control.lqr import Linearisation, TimeVaryingLQR, lqr_gains
 from agents.control.trajectory import Trajectory
 from elbow_gym import Simulator
 from elbow_gym.task.settings import Settings
@@ -15,7 +15,7 @@ from tests.support.trajectories import resting
 @pytest.mark.parametrize(("elbows", "payload"), [(0, 0.0), (2, 0.0), (0, 1.0)])
 def test_linearised_period_predicts_the_simulators_next_state(arm, elbows, payload):
     settings, trajectory = Settings(elbows=elbows, duration=0.1, payload=payload), resting(arm)
-    A, B = linearised_periods(settings, trajectory)
+    A, B = Linearisation(settings, 5)(trajectory.states[:-1], trajectory.voltage)
     simulator = Simulator(arm, elbows, 2, conditions=settings.conditions)
     rng = np.random.default_rng(0)
     current, voltage = 1e-3 * rng.normal(size=10), 1e-3 * rng.normal(size=10)
