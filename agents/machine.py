@@ -9,7 +9,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-CODE = ("elbow_gym/**/*.py", "agents/control/*.py", "agents/evaluation/*.py", "agents/tasks.py")
+CODE = (
+    "elbow_gym/**/*.py",
+    *(f"agents/{room}/*.py" for room in ("control", "evaluation", "planning")),
+    "agents/tasks.py",
+)
 """Patterns of the files that the results of an evaluation depend on."""
 PICTURES = "rendering"
 """Folder of elbow_gym that only draws, so that no result depends on it."""

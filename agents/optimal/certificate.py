@@ -10,9 +10,9 @@ import numpy as np
 
 from agents.control.trajectory import OpenLoop, Trajectory
 from agents.evaluation.metrics import metrics
-from agents.optimal.collocation import Transcription
 from agents.optimal.guesses import cost_of, rollout, simulated
 from agents.optimal.solution import Solution, SolveError
+from agents.planning.collocation import Transcription
 
 REFINEMENT = 0.005
 """Largest change of the cost from COARSE to FINE, as a share of it [-]."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.planning.task import check_modelled
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.settings import Settings
@@ -29,19 +30,9 @@ class Problem:
 
     def __post_init__(self) -> None:
         settings = self.settings
-        unknown = {
-            "table": settings.table is not False,
-            "elbow_friction": settings.elbow_friction > 0.0,
-            "gear_coulomb_friction": bool((settings.parsed_arm.of_motors("gear_coulomb_friction") > 0.0).any()),
-            "heat": settings.heat,
-            "supply_resistance": settings.supply_resistance > 0.0,
-            "randomize": bool(settings.randomization.ranges),
-        }
-        for name, given in unknown.items():
-            if given:
-                raise ValueError(f"{name} must be off where a bound is asked for, got {getattr(settings, name)!r}")
-        if not settings.regeneration:
-            raise ValueError("regeneration must be True where a bound is asked for, got False")
+        check_modelled(settings)
+        if settings.randomization.ranges:
+            raise ValueError(f"randomize must be off where a bound is asked for, got {settings.randomize!r}")
         if settings.parsed_circle.drawn:
             names = ", ".join(settings.parsed_circle.drawn)
             raise ValueError(f"circle must be fixed where a bound is asked for, got a random {names}")

@@ -15,12 +15,13 @@ from itertools import islice
 
 from agents.control.trajectory import Trajectory
 from agents.optimal.certificate import Bound, checked
-from agents.optimal.collocation import Transcription
 from agents.optimal.descent import STAGES, Descended, Descent
 from agents.optimal.guesses import posture_guesses, simulated
 from agents.optimal.problem import Problem
 from agents.optimal.solution import SMOOTHINGS, Point, Progress, Solution, SolveError, solve
 from agents.optimal.store import Store
+from agents.planning.collocation import Transcription
+from agents.planning.collocation import Transcription
 from agents.workers import Job, Tell, compile_before, in_processes
 from elbow_gym.task.settings import Settings
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.control.trajectory import Trajectory
-from agents.optimal.collocation import Multipliers, Transcription
+from agents.planning.collocation import Multipliers, Transcription
 
 Array = NDArray[np.float64]
 

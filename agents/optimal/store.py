@@ -23,7 +23,14 @@ from elbow_gym.task.settings import Settings
 
 STORE = Path(__file__).parents[2] / ".benchmarks" / "bounds"
 """Folder of the solved tasks; ignored by git."""
-SOURCES = ("agents/optimal", "agents/control", "elbow_gym/simulation", "elbow_gym/kernel", "elbow_gym/task")
+SOURCES = (
+    "agents/optimal",
+    "agents/planning",
+    "agents/control",
+    "elbow_gym/simulation",
+    "elbow_gym/kernel",
+    "elbow_gym/task",
+)
 """Folders whose sources a solution or the simulator's verdict on it depends on."""
 SCALES = {"target": 0.1, "start": 0.3, "payload": 0.15, "weight": 0.5}
 """Differences that count as a distance of one: targets (root mean square) [m], start pose (largest) [rad], payload

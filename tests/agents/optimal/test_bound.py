@@ -17,9 +17,9 @@ from elbow_gym.task.settings import Settings
 def short():
     """0.1 s from the target with two elbows, and its solution."""
     pytest.importorskip("casadi")
-    from agents.optimal.collocation import Transcription
     from agents.optimal.problem import Problem
     from agents.optimal.solution import solve
+    from agents.planning.collocation import Transcription
 
     settings = Settings(start="on_target", duration=0.1, start_noise=0.0)
     program = Transcription(Problem(settings), 2)
@@ -34,7 +34,7 @@ def test_derivatives_of_the_program_are_those_of_its_functions(short):
     import casadi as ca
 
     program, _ = short
-    x, p = program._program["x"], [0.03, 1.0, 0.001]
+    x, p = program._program["x"], program._parameters(0.03)
     rng = np.random.default_rng(0)
     at, along = 0.3 * rng.normal(size=program.size), rng.normal(size=program.size)
     value = ca.Function("value", [x, program._program["p"]], [program._program["f"], program._program["g"]])
@@ -92,8 +92,8 @@ def test_an_impossible_problem_is_said_to_have_failed(short):
 
 
 def test_a_finer_mesh_takes_over_the_costates(short):
-    from agents.optimal.collocation import Transcription
     from agents.optimal.solution import Point, solve
+    from agents.planning.collocation import Transcription
 
     program, solution = short
     fine = Transcription(program.problem, 3)
@@ -122,9 +122,9 @@ def test_residuals_see_what_is_no_solution(short):
 
 def test_payload_enters_the_program_and_the_simulator_agrees(short):
     """A heavy load bends the solution; the simulator with the load reaches what the program promises."""
-    from agents.optimal.collocation import Transcription
     from agents.optimal.problem import Problem
     from agents.optimal.solution import Point, solve
+    from agents.planning.collocation import Transcription
 
     program, solution = short
     settings = replace(program.problem.settings, payload=0.3)

@@ -1,22 +1,27 @@
-"""Episode of the environment as a sparse nonlinear program: Radau collocation of arm, motors and elbows.
+"""Episode, or a part of one, as a sparse nonlinear program: Radau collocation of arm, motors and elbows.
 
 One control period under held voltages is one element with `degree` Radau points, which are stiffly accurate: the
 armature (1.5 ms) and the light links (5 ms) are faster than the period (20 ms). The motion equations are
 inverse-dynamics residuals, so that no linear solve enters an expression; the elbows' velocities are held at zero (held
 heights, of index 3, have multipliers that swing between the points). Every point's derivatives are one small CasADi
-function mapped over all points, the rest is constant.
+function mapped over all points, the rest is constant. Start, targets and prices are parameters of the program, so that
+a planner solves one program in every control period.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agents.control.inverse_dynamics import InverseDynamics
-from agents.optimal.points import NAMES, Points
-from agents.optimal.problem import Problem
+from agents.planning.layout import NAMES, STATE, Layout, collocation_rows, power_form
+from agents.planning.points import Points
+from agents.planning.sparse import casadi_matrix, lagrange
+from agents.planning.tail import Tail
+from agents.planning.task import Task
 from elbow_gym.kinematics import hand_position
 
 Array = NDArray[np.float64]
@@ -39,11 +44,12 @@ class Transcription:
     """Program and its solver. Variables: all points one after the other, then the voltages of all periods.
 
     Args:
-        problem: problem to solve.
+        problem: periods to transcribe.
         degree: Radau points in a control period.
+        tail: cost behind the last period; none when None.
     """
 
-    def __init__(self, problem: Problem, degree: int) -> None:
+    def __init__(self, problem: Task, degree: int, tail: Tail | None = None) -> None:
         import casadi as ca
 
         # CasADi from 3.8 on warns of NumPy's functions on its symbols unless told which behaviour is meant.
@@ -51,88 +57,57 @@ class Transcription:
             ca.GlobalOptions.setNumpyMode(-1)
         settings = problem.settings
         self.problem, self.degree = problem, degree
-        self.periods, self.period = settings.horizon, settings.control_period
+        self.periods, self.period = len(problem.target), settings.control_period
         self.inverse = InverseDynamics(settings.parsed_arm, settings.elbow_joints, settings.payload)
         self.n = settings.parsed_arm.n_joints
         self.points = Points(self.inverse, problem.above_table)
         self.fractions = np.array(ca.collocation_points(degree, "radau"))
         self._derivative = np.array(ca.collocation_coeff(self.fractions.tolist())[0])
         self._weights = np.linalg.inv(self._derivative[1:].T)[-1]
-        self._voltages = self.periods * degree * self.points.size
-        self.size = self._voltages + self.periods * self.n
-        self._start = {"q": problem.start, "q_dot": np.zeros(self.n), "current": np.zeros(self.n)}
-        self._write(ca)
+        layout = Layout(self.periods, degree, self.points.size, self.n)
+        self._voltages, self.size = layout.voltages, layout.size
+        rows, self._of_start = collocation_rows(layout, self.inverse, self.period, self._derivative)
+        power, self._power_of_start = power_form(layout, self.inverse, self.period)
+        self._solvers: dict[tuple[tuple[str, Any], ...], Any] = {}
+        self._write(ca, rows, power, tail)
+        rest = np.zeros(self.n)
+        self.begin({"q": problem.start, "q_dot": rest, "current": rest}, problem.target)
 
-    def _place(self, period: int, point: int, name: str) -> Any:
-        """Indices of a quantity at point 1..degree of a period; point 0 is the last one before (None at the start)."""
-        at = period * self.degree + point - 1
-        return None if at < 0 else at * self.points.size + NAMES.index(name) * self.n + np.arange(self.n)
+    def begin(self, start: Mapping[str, Array], target: Array, velocity: Array | None = None) -> None:
+        """Sets where the periods start and what the hand is to follow.
 
-    def _collocation(self) -> tuple[Any, Array]:
-        """Constant rows A x = b: derivatives of q, q_dot and current at every point."""
-        from scipy import sparse
-
-        inverse, h, rows, right = self.inverse, self.period, _Triplets(), []
-        row = np.arange(self.n)
-        for k in range(self.periods):
-            for j in range(1, self.degree + 1):
-                for name, rate in (("q", "q_dot"), ("q_dot", "q_ddot"), ("current", None)):
-                    scale = inverse.inductance / h if rate is None else np.ones(self.n)
-                    b = np.zeros(self.n)
-                    for m in range(self.degree + 1):
-                        slope, place = scale * self._derivative[m, j - 1], self._place(k, m, name)
-                        if place is None:
-                            b -= slope * self._start[name]
-                        else:
-                            rows.add(row, place, slope)
-                    if rate is not None:
-                        rows.add(row, self._place(k, j, rate), np.full(self.n, -h))
-                    else:
-                        rows.add(row, self._place(k, j, "current"), inverse.resistance)
-                        rows.add(row, self._place(k, j, "q_dot"), inverse.torque_constant)
-                        rows.add(row, self._voltages + k * self.n + np.arange(self.n), -np.ones(self.n))
-                    right.append(b)
-                    row = row + self.n
-        return sparse.csc_matrix(rows.triplets, shape=(len(right) * self.n, self.size)), np.concatenate(right)
-
-    def _power(self) -> tuple[Any, Array]:
-        """Sum of the periods' mean powers as x^T P x / 2 + p x, P's upper triangle.
-
-        Under a held voltage the charge is exactly (v h - K_m dq - L di) / R, so the energy is v times that.
+        Args:
+            start: q [rad], q_dot [rad/s] and current [A], each (n,), with the elbows at z = 0.
+            target: targets at the ends of the control periods [m], (N, 3).
+            velocity: velocity of the last of them [m/s], (3,), for the tail; zero when None.
         """
-        from scipy import sparse
+        self._start = {name: start[name] for name in STATE}
+        self._target, self._velocity = target, np.zeros(3) if velocity is None else velocity
+        state = np.concatenate([start[name] for name in STATE])
+        right = self._of_start @ state
+        self._linear = self._power_of_start @ state
+        for side in ("lbg", "ubg"):
+            self._bounds[side][-right.size :] = right
 
-        inverse, h, entries, linear = self.inverse, self.period, _Triplets(), np.zeros(self.size)
-        for k in range(self.periods):
-            v = self._voltages + k * self.n + np.arange(self.n)
-            entries.add(v, v, 2.0 / inverse.resistance)
-            for name, constant in (("q", inverse.torque_constant), ("current", inverse.inductance)):
-                slope = constant / inverse.resistance / h
-                entries.add(self._place(k, self.degree, name), v, -slope)
-                before = self._place(k, 0, name)
-                if before is None:
-                    linear[v] += slope * self._start[name]
-                else:
-                    entries.add(before, v, slope)
-        return sparse.csc_matrix(entries.triplets, shape=(self.size, self.size)), linear
-
-    def _write(self, ca: Any) -> None:
+    def _write(self, ca: Any, rows: Any, power: Any, tail: Tail | None) -> None:
         from scipy import sparse
 
         points, count, volts = self.points, self.periods * self.degree, self.periods * self.n
-        rows, right = self._collocation()
-        power, linear = self._power()
-        whole = power + sparse.triu(power, 1).T
-        self._power_form = (whole, linear)
-        A, P, upper, p = (_matrix(ca, rows), _matrix(ca, whole), _matrix(ca, power), ca.DM(linear))
+        self._power_form = power + sparse.triu(power, 1).T
+        A, P, upper = (casadi_matrix(ca, matrix) for matrix in (rows, self._power_form, power))
         x = ca.MX.sym("x", self.size)
-        parameters = ca.MX.sym("p", 3)
+        aims = 3 * self.periods
+        parameters = ca.MX.sym("p", 3 + aims + 3 + self.n)
         scale, multipliers = ca.MX.sym("f"), ca.MX.sym("g", count * points.conditions + rows.shape[0])
         smoothing, tracking, energy = parameters[0], parameters[1], parameters[2]
         Z = ca.reshape(x[: self._voltages], points.size, count)
         # The reward depends on the last point of each period alone.
         last = np.tile(np.arange(self.degree) == self.degree - 1, self.periods).astype(float)
-        target = ca.DM(np.repeat(self.problem.target, self.degree, axis=0).T)
+        aim, velocity, first = ca.vertsplit(parameters[3:], np.cumsum([0, aims, 3, self.n]).tolist())
+        at = ca.DM(np.repeat(np.eye(self.periods), self.degree, axis=1))
+        target = ca.mtimes(ca.reshape(aim, 3, self.periods), at)
+        # Of the power's linear part the first period's voltages alone have any.
+        p = ca.vertcat(ca.MX.zeros(self._voltages), first, ca.MX.zeros(volts - self.n))
         seen = (Z, target, ca.repmat(smoothing, 1, count), ca.DM(last[None]) * tracking)
         cost = ca.sum2(points.cost.map(count)(*seen)) + energy * (ca.dot(x, ca.mtimes(P, x)) / 2 + ca.dot(p, x))
         slope = ca.vertcat(ca.vec(points.slope.map(count)(*seen)), ca.MX.zeros(volts)) + energy * (ca.mtimes(P, x) + p)
@@ -145,6 +120,14 @@ class Transcription:
         curvature = ca.vec(points.hessian.map(count)(*seen, ca.repmat(scale, 1, count), own))
         places = ca.diagcat(*[points.hessian_sparsity] * count, ca.Sparsity(volts, volts))
         hessian = ca.MX(places, curvature) + scale * energy * upper
+        if tail is not None:
+            before, behind = self._voltages - points.size, volts
+            of_end = (Z[:, -1], aim[-3:], velocity, smoothing, tracking, energy)
+            written = tail.written(ca, points.size)
+            cost += written.cost(*of_end)
+            slope += ca.vertcat(ca.MX.zeros(before), written.slope(*of_end), ca.MX.zeros(behind))
+            block = ca.diagcat(ca.Sparsity(before, before), written.hessian_sparsity, ca.Sparsity(behind, behind))
+            hessian += scale * ca.MX(block, written.hessian(*of_end))
         self._program = {"x": x, "p": parameters, "f": cost, "g": conditions}
         inputs = ["x", "p"]
         self._derivatives = {
@@ -158,12 +141,12 @@ class Transcription:
                 ["triu_hess_gamma_x_x"],
             ),
         }
-        low = np.concatenate([np.zeros(count * points.conditions), right])
         room = np.zeros((count, points.conditions))
         room[:, points.equalities :] = np.inf
         limit = np.full(self.size, np.inf)
         limit[self._voltages :] = self.problem.settings.voltage_limit
-        self._bounds = {"lbx": -limit, "ubx": limit, "lbg": low, "ubg": np.concatenate([room.ravel(), right])}
+        low, high = np.zeros(room.size + rows.shape[0]), np.concatenate([room.ravel(), np.zeros(rows.shape[0])])
+        self._bounds = {"lbx": -limit, "ubx": limit, "lbg": low, "ubg": high}
 
     def solve(
         self, guess: Array, smoothing: float, multipliers: Multipliers | None = None, **options: Any
@@ -187,18 +170,20 @@ class Transcription:
             # A larger barrier would first drive the solution away from where it has already come.
             pushes = {f"warm_start_{part}_push": 1e-6 for part in ("bound", "mult_bound", "slack_bound")}
             chosen = {"warm_start_init_point": "yes", "mu_init": 1e-6, **pushes, **chosen}
-        solver = ca.nlpsol(
-            "solver",
-            "ipopt",
-            self._program,
-            {"print_time": False, **self._derivatives, **{f"ipopt.{k}": v for k, v in chosen.items()}},
-        )
+        kind = tuple(sorted(chosen.items()))
+        if kind not in self._solvers:
+            named = {f"ipopt.{name}": value for name, value in chosen.items()}
+            options = {"print_time": False, **self._derivatives, **named}
+            self._solvers[kind] = ca.nlpsol("solver", "ipopt", self._program, options)
+        solver = self._solvers[kind]
         found = solver(x0=guess, p=self._parameters(smoothing), **self._bounds, **warm)
         x, lam_x, lam_g = (np.array(found[name]).ravel() for name in ("x", "lam_x", "lam_g"))
         return x, (lam_x, lam_g), solver.stats()
 
-    def _parameters(self, smoothing: float) -> list[float]:
-        return [smoothing, self.problem.settings.tracking_weight, self.problem.settings.energy_weight]
+    def _parameters(self, smoothing: float) -> Array:
+        prices = smoothing, self.problem.settings.tracking_weight, self.problem.settings.energy_weight
+        first = self._linear[self._voltages : self._voltages + self.n]
+        return np.concatenate([prices, self._target.ravel(), self._velocity, first])
 
     def residuals(self, x: Array, smoothing: float, multipliers: Multipliers) -> tuple[float, float, float]:
         """How far a point is from meeting the first-order conditions.
@@ -235,7 +220,7 @@ class Transcription:
         """
         parts, voltage = other.split(x)
         with_start = np.concatenate([[0.0], other.fractions])
-        through, inner = _lagrange(with_start, self.fractions), _lagrange(other.fractions, self.fractions)
+        through, inner = lagrange(with_start, self.fractions), lagrange(other.fractions, self.fractions)
         values = []
         for name, value in parts.items():
             if name in self._start:
@@ -251,6 +236,18 @@ class Transcription:
         bounds = np.concatenate([np.zeros(self._voltages), multipliers[0][other._voltages :]])
         return np.concatenate([points, voltage.ravel()]), (bounds, np.concatenate(conditions))
 
+    def later(self, x: Array, multipliers: Multipliers | None) -> tuple[Array, Multipliers | None]:
+        """Variables and multipliers one control period later; those of the last period stay in it, too."""
+        conditions = self.periods * self.degree * self.points.conditions
+
+        def moved(values: Array, end: int) -> Array:
+            kinds = (part.reshape(self.periods, -1) for part in (values[:end], values[end:]))
+            return np.concatenate([np.concatenate([rows[1:], rows[-1:]]).ravel() for rows in kinds])
+
+        if multipliers is None:
+            return moved(x, self._voltages), None
+        return moved(x, self._voltages), (moved(multipliers[0], self._voltages), moved(multipliers[1], conditions))
+
     def split(self, x: Array) -> tuple[dict[str, Array], Array]:
         """The quantities of `NAMES` at all points, each (periods, degree, ...), and the voltages [V], (periods, n)."""
         points = x[: self._voltages].reshape(self.periods, self.degree, -1)
@@ -264,43 +261,11 @@ class Transcription:
         return np.concatenate([points.ravel(), voltage.ravel()])
 
     def cost(self, x: Array) -> float:
-        """Negative return of a solution, the tracking error taken as it is."""
+        """Negative return of a solution without the tail, the tracking error taken as it is."""
         settings, q = self.problem.settings, self.split(x)[0]["q"][:, -1]
-        error = np.linalg.norm(hand_position(settings.parsed_arm, q) - self.problem.target, axis=-1)
+        error = np.linalg.norm(hand_position(settings.parsed_arm, q) - self._target, axis=-1)
         return float(settings.tracking_weight * error.sum() + settings.energy_weight * self.energy(x) / self.period)
 
     def energy(self, x: Array) -> float:
         """Electrical energy of a solution [J], signed."""
-        form, linear = self._power_form
-        return float(x @ (form @ x) / 2 + linear @ x) * self.period
-
-
-def _lagrange(nodes: Array, at: Array) -> Array:
-    """Matrix (len(at), len(nodes)) from a polynomial's values at nodes to those at other places."""
-    return np.linalg.solve(np.vander(nodes).T, np.vander(at, nodes.size).T).T
-
-
-class _Triplets:
-    """Entries of a sparse matrix, gathered block by block."""
-
-    def __init__(self) -> None:
-        self._rows: list[Array] = []
-        self._columns: list[Array] = []
-        self._values: list[Array] = []
-
-    def add(self, rows: Any, columns: Any, values: Array) -> None:
-        self._rows.append(rows)
-        self._columns.append(columns)
-        self._values.append(values)
-
-    @property
-    def triplets(self) -> tuple[Array, tuple[Array, Array]]:
-        return np.concatenate(self._values), (np.concatenate(self._rows), np.concatenate(self._columns))
-
-
-def _matrix(ca: Any, matrix: Any) -> Any:
-    matrix = matrix.tocsc()
-    matrix.sum_duplicates()
-    matrix.sort_indices()
-    places = ca.Sparsity(*matrix.shape, matrix.indptr.tolist(), matrix.indices.tolist())
-    return ca.DM(places, matrix.data)
+        return float(x @ (self._power_form @ x) / 2 + self._linear @ x) * self.period

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from agents.control.inverse_dynamics import InverseDynamics
+from agents.planning.layout import NAMES
 
 SETTLING_TIME = 0.05
 """Time constant with which an elbow's height left by the discretisation decays [s]."""
-NAMES = ("q", "q_dot", "q_ddot", "current", "elbow_force")
-"""Quantities of a point, in their order."""
 
 
 class Points:
@@ -37,8 +38,7 @@ class Points:
         self.equalities, self.conditions = n + p, n + p + len(free)
 
         target, smoothing, weight = ca.SX.sym("target", 3), ca.SX.sym("smoothing"), ca.SX.sym("weight")
-        rho = ca.dot(ca.DM(length), ca.sin(phi).T)
-        error = ca.vertcat(rho * ca.cos(q[0]), rho * ca.sin(q[0]), heights[n - 1]) - target
+        error = hand(ca, inverse, q) - target
         cost = weight * ca.sqrt(ca.dot(error, error) + smoothing**2)
         scale, multipliers = ca.SX.sym("scale"), ca.SX.sym("multipliers", self.conditions)
         jacobian = ca.jacobian(conditions, z)
@@ -51,3 +51,10 @@ class Points:
         self.jacobian = ca.Function("jacobian", [z], [ca.vertcat(*jacobian.nonzeros())])
         self.hessian = ca.Function("hessian", [*seen, scale, multipliers], [ca.vertcat(*hessian.nonzeros())])
         self.jacobian_sparsity, self.hessian_sparsity = jacobian.sparsity(), hessian.sparsity()
+
+
+def hand(ca: Any, inverse: InverseDynamics, q: Any) -> Any:
+    """Symbolic position of the hand [m], (3, 1), at joint angles [rad], (1, n)."""
+    length, phi = ca.DM(inverse.arm.of_links("length")), ca.mtimes(q, ca.DM(inverse.to_pitch))
+    rho = ca.dot(length, ca.sin(phi).T)
+    return ca.vertcat(rho * ca.cos(q[0]), rho * ca.sin(q[0]), ca.dot(length, ca.cos(phi).T))

@@ -1,0 +1,1 @@
+"""Planners: controllers that look ahead with a model of the arm in every control period."""
