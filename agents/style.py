@@ -24,6 +24,8 @@ CONTROLLER_COLOURS = {
     "ppo_random": "#00395B",
     "sac_cloned": "#80CEB9",
     "sac_random": "#005A41",
+    "receding_horizon": "#AA3377",
+    "sampling_mpc": "#BBBB33",
 }
 CONTROLLER_NAMES = {
     "pd_paper": "PD, no limit",
@@ -40,6 +42,8 @@ CONTROLLER_NAMES = {
     "ppo_random": "PPO, drawn arms and circles",
     "sac_cloned": "SAC from the optimum's clone",
     "sac_random": "SAC, drawn arms and circles",
+    "receding_horizon": "receding horizon",
+    "sampling_mpc": "sampling MPC",
 }
 CONTROLLER_MARKERS = {
     "pd_paper": "v",
@@ -56,6 +60,8 @@ CONTROLLER_MARKERS = {
     "ppo_random": "<",
     "sac_cloned": "p",
     "sac_random": "H",
+    "receding_horizon": "8",
+    "sampling_mpc": ".",
 }
 
 

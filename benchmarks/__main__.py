@@ -1,4 +1,4 @@
-"""Commands of the benchmarks: `python -m benchmarks energy | learning | optimal | speed`."""
+"""Commands of the benchmarks: `python -m benchmarks energy | learning | optimal | planners | speed`."""
 
 from __future__ import annotations
 
@@ -90,6 +90,24 @@ def optimal(
     from benchmarks.optimal import optimal as solve_optimal
 
     solve_optimal(output, optima, fresh, workers, front)
+
+
+@app.command
+def planners(output: Path = LATEST, drawn: Count = 10, elbows: int = 2, publish: bool = False) -> None:
+    """Receding-horizon and sampling control beside PPO, computed torque and the bound, also on tasks drawn at random.
+
+    Takes about a quarter of an hour of CPU time. Bounds of drawn tasks are those that `python -m agents bound` has
+    stored.
+
+    Args:
+        output: Folder for the table.
+        drawn: Number of drawn tasks: circles, loads and starts.
+        elbows: Elbows on the table in the drawn tasks, 0, 1 or 2.
+        publish: Whether to write the results to benchmarks/results and the table into the README.
+    """
+    from benchmarks.planners import planners as measure_planners
+
+    print(measure_planners(output, drawn, elbows, publish))
 
 
 @app.command_from

@@ -8,6 +8,7 @@ from agents.files import write_text
 
 ROOT = Path(__file__).parents[1]
 BLOCKS = {
+    "agents/README.md": {"planners": "planners.md"},
     "README.md": {"energy": "energy_short.md"},
     "benchmarks/README.md": {
         "energy": "energy_brief.md",

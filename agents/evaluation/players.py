@@ -13,6 +13,9 @@ from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import Trajectory
 from agents.evaluation.own import KINDS, labelled, own_player, python_player, relabelled
 from agents.evaluation.player import TABLE, Maker, Player, player_of, policy_player
+from agents.machine import versions
+from agents.planning.receding_horizon import RecedingHorizon
+from agents.planning.sampling import Sampling
 from agents.shipped import OPTIMA
 from agents.shipped.seeds import load_policy, shipped_path, shipped_policies, shipped_seeds
 from agents.tasks import POLICY_NAME, Elbows, task_settings
@@ -27,7 +30,7 @@ ELBOW_COUNTS = (2, 1, 0)
 TABLE_ENV = "ElbowArmTable-v0"
 
 
-class Classical(NamedTuple):
+class Untrained(NamedTuple):
     """A controller that needs neither training nor a trajectory."""
 
     arguments: Mapping[str, Any]
@@ -37,16 +40,21 @@ class Classical(NamedTuple):
     """Time of a control period, times the PD's."""
 
 
-CLASSICAL: dict[str, Classical] = {
-    "pd_paper": Classical(UNLIMITED, PDController),
-    "pd": Classical(CLIPPED, PDController),
-    "pd_smooth": Classical(CLIPPED, SmoothPD, 1.4),
-    "pd_gravity": Classical(CLIPPED, GravityPD, 1.9),
-    "computed_torque": Classical(COMPUTED, ComputedTorque, 2.8),
-    "computed_torque_posture": Classical(COMPUTED, economical_computed_torque, 6.0),
+CLASSICAL: dict[str, Untrained] = {
+    "pd_paper": Untrained(UNLIMITED, PDController),
+    "pd": Untrained(CLIPPED, PDController),
+    "pd_smooth": Untrained(CLIPPED, SmoothPD, 1.4),
+    "pd_gravity": Untrained(CLIPPED, GravityPD, 1.9),
+    "computed_torque": Untrained(COMPUTED, ComputedTorque, 2.8),
+    "computed_torque_posture": Untrained(COMPUTED, economical_computed_torque, 6.0),
 }
 """The classical controllers by name. "pd" is the paper's, clipped to 24 V and read at 2 kHz; "pd_paper" has no limit
 and is read at 10 kHz."""
+PLANNERS: dict[str, Untrained] = {
+    "receding_horizon": Untrained({}, RecedingHorizon, 800.0),
+    "sampling_mpc": Untrained({}, Sampling, 300.0),
+}
+"""The planners by name. They take too long for a comparison with everybody, so that `entries` leaves them out."""
 LQR_EFFORT = 20.0
 """Time of the LQR's control period, times the PD's: its gains are found before the first."""
 
@@ -76,20 +84,21 @@ class Entry(NamedTuple):
         Raises:
             ValueError: the name is not in the registry.
         """
-        if self.name in CLASSICAL:
-            return classical_player(self.name, self.elbows, self.env)
+        if self.name in CLASSICAL or self.name in PLANNERS:
+            return untrained_player(self.name, self.elbows, self.env)
         if self.name == "lqr":
             return lqr_player(self.elbows)
         group = learned().get(self)
         if group is None:
-            raise ValueError(f"player must be one of {sorted({entry.name for entry in entries()})}, got {self.name!r}")
+            known = sorted({entry.name for entry in entries()} | set(PLANNERS))
+            raise ValueError(f"player must be one of {known}, got {self.name!r}")
         path = baseline_path(group) if seed is None else shipped_path(group, seed)
         settings = task_settings(self.env, self.elbows)
         return policy_player(self.name, read_policy(path), settings, seed=int(path.name.rpartition("_seed")[2]))
 
 
 def entries() -> list[Entry]:
-    """All entries: classical controllers, and those that a file is there for; the compliant table's at the end.
+    """All entries but `PLANNERS`: classical ones, and those that a file is there for; the compliant table's at the end.
 
     Where a policy for the compliant table is shipped, the classical controllers with a supply of 24 V play there too.
     """
@@ -161,17 +170,17 @@ def find_player(
 
 
 def known_names(elbows: Elbows | None = None, env: str = "ElbowArm-v0") -> list[str]:
-    """Names of the registry in an environment with elbows on the table, the classical controllers' first."""
+    """Names of the registry in an environment with elbows, the classical controllers' first and the planners' last."""
     count = registered_arguments(env).get("elbows", 2) if elbows is None else elbows
     beside = {one.name for one in entries() if one[1:] == (count, env)}
-    return [*CLASSICAL, *sorted(beside - set(CLASSICAL))]
+    return [*CLASSICAL, *sorted(beside - set(CLASSICAL)), *PLANNERS]
 
 
 def _registered(name: str, elbows: Elbows | None, env: str, more: Mapping[str, Any]) -> Player | None:
     """The player of a name in the registry; None where it is not there."""
     count = registered_arguments(env).get("elbows", 2) if elbows is None else elbows
-    if name in CLASSICAL:
-        return classical_player(name, elbows, env, more)
+    if name in CLASSICAL or name in PLANNERS:
+        return untrained_player(name, elbows, env, more)
     if name == "lqr" and env == "ElbowArm-v0":
         if more or isinstance(count, tuple):
             raise ValueError(f"lqr must play its optimal trajectory in the default environment, got {sorted(more)}")
@@ -187,11 +196,13 @@ def _registered(name: str, elbows: Elbows | None, env: str, more: Mapping[str, A
     return None
 
 
-def classical_player(name: str, elbows: Elbows | None, env: str, more: Mapping[str, Any] | None = None) -> Player:
-    """One of `CLASSICAL` in a registered environment, whose further arguments `more` has."""
-    arguments, make, effort = CLASSICAL[name]
+def untrained_player(name: str, elbows: Elbows | None, env: str, more: Mapping[str, Any] | None = None) -> Player:
+    """One of `CLASSICAL` or `PLANNERS` in a registered environment, whose further arguments `more` has."""
+    arguments, make, effort = {**CLASSICAL, **PLANNERS}[name]
     settings = task_settings(env, elbows, {**arguments, **(more or {})})
-    return player_of(name, settings, make, effort=effort, identity=name, starts_together=True)
+    # A planner's solver is no part of this code.
+    identity = f"{name} {versions('casadi')}" if name in PLANNERS else name
+    return player_of(name, settings, make, effort=effort, identity=identity, starts_together=True)
 
 
 def optimal_trajectory(elbows: int, start: str) -> Path:

@@ -10,7 +10,7 @@ from typing import Any
 from agents.evaluation.guest import Guest
 from agents.evaluation.metrics import REGIMES, Regime
 from agents.evaluation.player import Player
-from agents.evaluation.players import CLASSICAL, ELBOW_COUNTS, TABLE_ENV, Entry, entries, find_player
+from agents.evaluation.players import CLASSICAL, ELBOW_COUNTS, PLANNERS, TABLE_ENV, Entry, entries, find_player
 from agents.evaluation.regimes import SHIFTED
 from agents.style import CONTROLLER_NAMES
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP, PDController
@@ -72,8 +72,8 @@ def cells(parts: Sequence[str] = tuple(PARTS)) -> list[Cell]:
 
 
 def featured(controller: str) -> bool:
-    """Whether a controller is in the short table and the figure: those of `FEATURED`, and a user's own."""
-    return controller in FEATURED or controller not in CONTROLLER_NAMES
+    """Whether a controller is in the short table and the figure: those of `FEATURED`, and who was asked for by name."""
+    return controller in FEATURED or controller in PLANNERS or controller not in CONTROLLER_NAMES
 
 
 def guest_cells(guests: Sequence[Guest], counts: Sequence[int]) -> list[Cell]:
@@ -88,17 +88,21 @@ def guest_cells(guests: Sequence[Guest], counts: Sequence[int]) -> list[Cell]:
     return [Cell(guest.label, elbows, guest=guest) for guest in guests for elbows in guest.plays_at(counts)]
 
 
-def own_arm_cells(arguments: Mapping[str, Any], guests: Sequence[Guest] = ()) -> list[Cell]:
-    """Comparisons on a user's own arm: the classical controllers that reach its circle, and guests.
+def own_arm_cells(
+    arguments: Mapping[str, Any], guests: Sequence[Guest] = (), planners: Sequence[str] = ()
+) -> list[Cell]:
+    """Comparisons on a user's own arm: the classical controllers that reach its circle, planners and guests.
 
     Args:
         arguments: arguments of the environment, the arm and the elbows' joints among them.
         guests: players of the user's own.
+        planners: names of planners.
     """
     settings = Settings(**arguments)
     parsed = {**arguments, "arm": settings.parsed_arm, "elbows": settings.elbow_joints}
     shared = tuple(sorted({**parsed, "circle": settings.parsed_circle}.items()))
-    names = [(name, None) for name in CLASSICAL if name != "pd_paper"] + [(guest.label, guest) for guest in guests]
+    names = [(name, None) for name in (*CLASSICAL, *planners) if name != "pd_paper"]
+    names += [(guest.label, guest) for guest in guests]
     return [Cell(name, len(settings.elbow_joints), guest=guest, arguments=shared) for name, guest in names]
 
 

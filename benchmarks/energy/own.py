@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from agents.evaluation.guest import Guest
-from agents.evaluation.players import known_names
+from agents.evaluation.players import PLANNERS, known_names
 from agents.task_options import TaskOptions
 from agents.tasks import task_settings
 from benchmarks.energy import terminal
@@ -28,7 +28,9 @@ def measure_own(task: TaskOptions, names: Sequence[str], trust: bool, **options:
     Raises:
         ValueError: a player is unknown or plays nowhere, or joint numbers are given for the paper's arm.
     """
-    guests = [Guest.named(name, trust) for name in names]
+    planners = [name for name in names if name in PLANNERS]
+    options["planners"] = planners
+    guests = [Guest.named(name, trust) for name in names if name not in PLANNERS]
     if task.arm is None and not task.environment:
         if isinstance(task.elbows, tuple):
             raise ValueError(f"--elbows must be 0, 1 or 2 without --arm or --environment, got {task.elbows}")

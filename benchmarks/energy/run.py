@@ -253,6 +253,7 @@ def energy(
     parallel: bool = True,
     command: str = "",
     guests: Sequence[Guest] = (),
+    planners: Sequence[str] = (),
     elbows: int | None = None,
     arguments: Mapping[str, Any] | None = None,
 ) -> list[Row]:
@@ -268,6 +269,7 @@ def energy(
         parallel: one cell on each core.
         command: the command line, for energy.json.
         guests: players of the user's own, which play the nominal part.
+        planners: names of planners, which play it, too.
         elbows: the only elbow count that is compared; all when None.
         arguments: arguments of a user's own environment, the elbows among them, in which the classical controllers play
             instead of all players in the default one.
@@ -276,15 +278,16 @@ def energy(
         ValueError: own players or an own environment would be published, or a guest plays nowhere.
     """
     started = time.monotonic()
-    if publish and (guests or arguments or elbows is not None):
+    if publish and (guests or planners or arguments or elbows is not None):
         raise ValueError("--publish must be given without --with, --elbows, --arm and --environment")
     chosen = plan(full or publish, episodes, folder=folder, fresh=fresh)
     if arguments is not None:
-        chosen = replace(chosen, cells=own_arm_cells(arguments, guests), every_seed=False)
+        chosen = replace(chosen, cells=own_arm_cells(arguments, guests, planners), every_seed=False)
     else:
         counts = ELBOW_COUNTS if elbows is None else (elbows,)
         shown = [cell for cell in chosen.cells if elbows is None or cell.elbows == elbows]
-        chosen = replace(chosen, cells=[*shown, *guest_cells(guests, counts)])
+        planned = [Cell(name, count) for name in planners for count in counts]
+        chosen = replace(chosen, cells=[*shown, *planned, *guest_cells(guests, counts)])
     output = RESULTS if publish else output
     for place in (output, folder):
         check_writable(place)
