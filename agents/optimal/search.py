@@ -21,7 +21,6 @@ from agents.optimal.problem import Problem
 from agents.optimal.solution import SMOOTHINGS, Point, Progress, Solution, SolveError, solve
 from agents.optimal.store import Store
 from agents.planning.collocation import Transcription
-from agents.planning.collocation import Transcription
 from agents.workers import Job, Tell, compile_before, in_processes
 from elbow_gym.task.settings import Settings
 
