@@ -1,4 +1,4 @@
-"""Configuration of all tests: hypothesis's profile, windows that nobody sees, one thread, markers, the paper's arm."""
+"""Configuration of all tests: hypothesis's profile, windows that nobody sees, one thread, markers, kernels, the arm."""
 
 import os
 import signal
@@ -11,6 +11,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from elbow_gym import paper_arm
+from elbow_gym.kernel.build import kernel
+from tests.support.kernel_calls import shared
 
 settings.register_profile(
     "elbow_gym",
@@ -29,6 +31,25 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.get_closest_marker("soak") or item.get_closest_marker("timing"):
             item.add_marker("slow")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _shared_kernels():
+    """Simulators with some switches on step in the kernel that has all of them.
+
+    Each kernel takes 8 to 17 s of CPU to compile. That a switch which has nothing to do changes no bit, and that every
+    kernel has the bits of its source, are laws of their own (laws/test_switches.py).
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("elbow_gym.simulator.kernel", shared)
+        yield
+
+
+@pytest.fixture(autouse=True)
+def _own_kernels_in_soak(request, monkeypatch):
+    """What is soak steps in the kernels that users have."""
+    if request.node.get_closest_marker("soak") or request.node.get_closest_marker("timing"):
+        monkeypatch.setattr("elbow_gym.simulator.kernel", kernel)
 
 
 @pytest.fixture(scope="session")

@@ -49,6 +49,8 @@ def parameter_rows(
     motor_friction = values["gear_viscous_friction"] * gear**2
     warming = float(conditions.heat)
     table = conditions.surface or TableParameters()
+    # Without a table zero, with which a kernel that knows of one does no more than a kernel that does not.
+    stiffness = 0.0 if conditions.surface is None else table.stiffness
     rows = {
         "length": length,
         "mass": mass,
@@ -63,7 +65,7 @@ def parameter_rows(
         "inverse_inductance": 1.0 / values["armature_inductance"],
         "gravity": gravity * one,
         "payload": np.asarray(payload)[..., None] * one,
-        "stiffness": table.stiffness * one,
+        "stiffness": stiffness * one,
         "dissipation": table.dissipation * one,
         "table_friction": table.friction * one,
         "friction_velocity": table.friction_velocity * one,

@@ -1,7 +1,4 @@
-"""Every switch through the environments: conformance, bounds under the worst voltages, and wrong values named.
-
-Kernels with all switches on, or the table alone, are those that other tests compile; the others are soak.
-"""
+"""Every switch through the environments: conformance, bounds under the worst voltages, and wrong values named."""
 
 import json
 
@@ -45,11 +42,9 @@ SWITCHES = {
     },
 }
 IDS = ("ElbowArmTable-v0", "ElbowArmRandom-v0")
-COMPILED_FOR_THIS = ("elbow friction", "drive")
-NAMES = [pytest.param(name, marks=pytest.mark.soak if name in COMPILED_FOR_THIS else ()) for name in SWITCHES]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SWITCHES)
 def test_both_checkers_pass_with_every_switch(name):
     check_env(ElbowArmEnv(**SWITCHES[name]), skip_render_check=True)
     sb3 = pytest.importorskip("stable_baselines3.common.env_checker")
@@ -66,7 +61,7 @@ def test_registered_tasks_conform_and_round_trip_through_json(name):
     json.dumps(env.unwrapped.settings.arguments)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SWITCHES)
 @pytest.mark.parametrize("bang_bang", [False, True])
 def test_seventy_thousand_steps_of_the_worst_voltages_stay_within_the_bounds(name, bang_bang):
     arms, periods = 256, 30

@@ -5,7 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elbow_gym import ArmParameters, LinkParameters, MotorParameters, Simulator, dynamics, kinematics, paper_arm
+from elbow_gym import (
+    ArmParameters,
+    Conditions,
+    LinkParameters,
+    MotorParameters,
+    Simulator,
+    dynamics,
+    kinematics,
+    paper_arm,
+)
+from tests.support.kernel_calls import shared
 
 
 def volts(size, seed=0):
@@ -181,6 +191,36 @@ def test_an_arm_whose_state_or_meter_overflows_is_flagged_and_kept():
     sim.step(np.full(10, 1e200))
     assert not sim.valid[0]
     assert not sim.copper_loss.any()
+
+
+ROUGH = replace(paper_arm(), motors=(*paper_arm().motors[1:], MotorParameters(gear_coulomb_friction=0.005)))
+
+
+@pytest.mark.parametrize(
+    ("options", "lanes", "switches"),
+    [
+        ({}, 1, {"exponential"}),
+        ({"integrator": "rk4"}, 1, set()),
+        ({"num_envs": 2}, 1, {"exponential"}),
+        ({"num_envs": 3}, 16, {"exponential"}),
+        ({"conditions": Conditions(table=True)}, 1, {"exponential", "table"}),
+        ({"elbows": 2, "conditions": Conditions(elbow_friction=0.1)}, 1, {"exponential", "rubbing"}),
+        ({"conditions": Conditions(elbow_friction=0.1)}, 1, {"exponential"}),
+        ({"conditions": Conditions(heat=True)}, 1, {"exponential", "drive"}),
+        ({"conditions": Conditions(supply_resistance=0.1)}, 1, {"exponential", "drive"}),
+        ({"arm": ROUGH}, 1, {"exponential", "drive"}),
+    ],
+)
+def test_a_simulator_steps_in_the_kernel_of_its_switches_alone(monkeypatch, options, lanes, switches):
+    asked = []
+
+    def kernel(lanes, **on):
+        asked.append((lanes, {name for name, value in on.items() if value}))
+        return shared(lanes, **on)
+
+    monkeypatch.setattr("elbow_gym.simulator.kernel", kernel)
+    Simulator(**{"arm": "paper", "elbows": 0, "timestep": 5e-4, **options})
+    assert asked == [(lanes, switches)]
 
 
 def test_on_table_refuses_a_pose_with_no_way_down():

@@ -11,22 +11,15 @@ from elbow_gym import Conditions, MotorParameters, Simulator, kinematics, motors
 from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.simulation.rates import rates
 from elbow_gym.simulation.step_limit import limits
-from tests.support.kernel_calls import uncompiled
 
 # Rotors too heavy to move and hardly driven: L di/dt = v - R i alone.
 STALLED = MotorParameters(rotor_inertia=1e12, torque_constant=1e-200)
 
 
 def stalled(motor=STALLED, timestep=5e-4, **conditions):
-    """An arm that leans on its elbows; its motors stand still all the same, and no kernel is compiled for it alone."""
-    leaning = Conditions(table=True, elbow_friction=0.1, **conditions)
-    return Simulator(replace(paper_arm(), motors=(motor,) * 10), 2, conditions=leaning, timestep=timestep)
-
-
-@pytest.fixture
-def python_kernels(monkeypatch):
-    """Kernels in plain Python, for short runs of one arm with switches that few tests have on together."""
-    monkeypatch.setattr("elbow_gym.simulator.kernel", uncompiled)
+    """An arm whose motors stand still."""
+    arm = replace(paper_arm(), motors=(motor,) * 10)
+    return Simulator(arm, 0, conditions=Conditions(**conditions), timestep=timestep)
 
 
 def test_a_stalled_motors_winding_approaches_its_steady_rise_at_its_own_rate():
@@ -106,7 +99,6 @@ def rough_yaw(coulomb):
     return sim
 
 
-@pytest.mark.usefixtures("python_kernels")
 @pytest.mark.parametrize("share", [0.5, 0.9, 3.0])
 def test_a_gears_coulomb_friction_holds_against_less_and_yields_to_more(share):
     coulomb = 0.005
@@ -143,7 +135,6 @@ def test_a_step_too_long_for_what_is_fastest_is_refused(motor, conditions, integ
         Simulator(arm, 0, conditions=Conditions(**conditions), timestep=0.002, integrator=integrator)
 
 
-@pytest.mark.usefixtures("python_kernels")
 def test_a_rough_gear_at_the_longest_step_that_is_allowed_comes_to_rest():
     arm = replace(paper_arm(), motors=(MotorParameters(gear_coulomb_friction=0.05),) * 10)
     limit, _ = limits(rates(parameter_table(arm, Conditions()), Conditions(), elbows=False), "exponential")
@@ -153,8 +144,6 @@ def test_a_rough_gear_at_the_longest_step_that_is_allowed_comes_to_rest():
     assert np.abs(sim.q_dot).max() < 1e-6
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("python_kernels")
 @pytest.mark.parametrize("elbows", [1, 2])
 def test_an_arm_slides_less_far_on_rubbing_elbows(elbows):
     ways = []

@@ -35,7 +35,7 @@ def stored_energy(sim):
     rotors = (row["reflected_inertia"] * sim.q_dot**2).sum(1) + row["axial_inertia"][:, 0] * psi_dot[:, 0] ** 2
     lowest = np.cumsum(length, 1)
     raised = (mass * (z - cosine / 2.0 + lowest - length / 2.0)).sum(1) + load * (z[:, -1] + lowest[:, -1])
-    elastic = (row["stiffness"][:, 1:] * np.minimum(z, 0.0) ** 2).sum(1) * (sim.conditions.surface is not None)
+    elastic = (row["stiffness"][:, 1:] * np.minimum(z, 0.0) ** 2).sum(1)
     magnetic = (sim.current**2 / row["inverse_inductance"]).sum(1)
     kinetic = (turning + moving).sum(1) + carried + rotors
     return (kinetic + elastic + magnetic) / 2.0 + row["gravity"][:, 0] * raised
@@ -106,8 +106,7 @@ FOUND = {
 """Settings that were wrong, with what happens in them; each is right now."""
 
 EVERYTHING = ("table", "rubbing", "heat", "supply", "payload")
-# Kernels that other tests have compiled, too.
-COMPILED = {
+FEW = {
     "the paper's arm": {"on": ()},
     "table": {"on": ("table",)},
     "everything": {"on": EVERYTHING},
@@ -116,19 +115,13 @@ COMPILED = {
 }
 
 
-@pytest.mark.parametrize("case", COMPILED)
+@pytest.mark.parametrize("case", FEW)
 def test_a_few_random_settings_are_refused_or_right(case):
-    how = COMPILED[case]
-    # Where elbows can rub there must be some, for without any of them the kernel is another one.
-    rubs = "rubbing" in how["on"]
-    drawn = (draw(np.random.default_rng((SEED, seed)), on=how["on"]).arguments for seed in range(30))
-    seeds = [seed for seed, arguments in enumerate(drawn) if arguments["elbows"] or not rubs][:10]
-    outcomes = {seed: outcome(seed, **how) for seed in seeds}
+    outcomes = {seed: outcome(seed, **FEW[case]) for seed in range(10)}
     assert not wrong(outcomes)
     assert Counter(outcomes.values())["right"] >= 5
 
 
-@pytest.mark.soak
 @pytest.mark.parametrize("seed", FOUND)
 def test_settings_that_were_wrong_are_right(seed):
     assert outcome(seed) == "right"

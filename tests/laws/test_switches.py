@@ -12,7 +12,6 @@ from elbow_gym import dynamics, motors, paper_arm
 from elbow_gym.kernel.build import kernel
 from elbow_gym.kernel.rows import (
     LARGEST_AMPLIFICATION,
-    PARAMETERS,
     STATE_ROWS,
     SUMMARY_COLUMNS,
     SWITCHED_STATE,
@@ -119,8 +118,6 @@ def advanced(entries, rows, on):
     )
     rough = tuple(replace(motor, gear_coulomb_friction=0.01 * on["drive"]) for motor in paper_arm().motors)
     parameters = parameter_table(replace(paper_arm(), motors=rough), under)
-    # Without a table, the default one's stiffness stands in the row that a kernel without one does not read.
-    parameters[PARAMETERS.index("stiffness")] *= on["table"]
     state, elbows = np.zeros((3, rows, 10)), np.array([4, 7])
     state[:, 0] = paper_arm().nominal_pose + 0.02 * rng.normal(size=(3, 10))
     state[:, 1:3] = rng.normal(size=(3, 2, 10))

@@ -45,11 +45,6 @@ def stored(sim):
     return mechanical_energy(sim) + load + elastic + inductor_energy(sim).sum()
 
 
-ALONE = ("rubbing elbows", "drive")
-"""Cases whose kernels no other test has compiled; "all" has all that they have."""
-NAMES = [pytest.param(case, marks=pytest.mark.soak if case in ALONE else ()) for case in CASES]
-
-
 @cache
 def ride(case):
     """A quarter of a second under random voltages from a pose on the table: the simulator and what it did.
@@ -77,7 +72,7 @@ def ride(case):
     return sim, stored(sim) - before, fed, np.array(forces), np.array(losses)
 
 
-@pytest.mark.parametrize("case", NAMES)
+@pytest.mark.parametrize("case", CASES)
 def test_energy_in_is_stored_or_lost(case):
     sim, gained, *_ = ride(case)
     lost = sim.copper_loss.sum() + sim.friction_loss.sum() + sim.contact_loss.sum()
@@ -87,7 +82,7 @@ def test_energy_in_is_stored_or_lost(case):
         assert sim.contact_loss.sum() > 0.05
 
 
-@pytest.mark.parametrize("case", [name for name in NAMES if name.values[0] in ("drive", "all")])
+@pytest.mark.parametrize("case", ["drive", "all"])
 def test_the_supply_feeds_motors_and_its_own_resistance(case):
     # V0 I = sum u i, by the trapezoidal rule, is sum v i + R_s I^2.
     sim, _, fed, *_ = ride(case)
@@ -95,7 +90,7 @@ def test_the_supply_feeds_motors_and_its_own_resistance(case):
     assert sim.supply_loss[0] > 1.0
 
 
-@pytest.mark.parametrize("case", NAMES)
+@pytest.mark.parametrize("case", CASES)
 def test_contacts_push_rub_against_the_sliding_and_only_take_energy(case):
     *_, forces, losses = ride(case)
     assert (forces[..., 2] >= 0.0).all()

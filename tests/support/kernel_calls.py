@@ -21,6 +21,11 @@ def uncompiled(lanes, **switches):
     return assemble(lanes, lambda function, **_: function, **({**off, "exponential": True} | switches))
 
 
+def shared(lanes, exponential=True, **switches):
+    """The plain kernel, or for any switches the one with all of them: the same bits, and two to compile of eight."""
+    return kernel(lanes, exponential=exponential, **(EVERYTHING if any(switches.values()) else {}))
+
+
 def states(q, q_dot, current):
     """Kernel state rows (B, STATE_ROWS, n) with empty meters."""
     state = np.zeros((len(q), STATE_ROWS, q.shape[1]))

@@ -205,8 +205,8 @@ def written(tmp_path_factory):
     return folder, found
 
 
-KINDS = ("fig01", "fig04", "fig05", "fig06", "fig07", "fig25", "paper_cases")
-"""One figure of each kind; those of the other joints are drawn as joint 1's and 10's are."""
+KINDS = ("fig01", "fig04", "fig25", "paper_cases")
+"""One figure of each kind: trajectories, a course in two panels, one in a single panel, and the overview."""
 
 
 def assert_drawn_in_three_colours(path):

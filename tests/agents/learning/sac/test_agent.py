@@ -1,7 +1,5 @@
 """The SAC: critics that are quadratic around the actor's slow copy, deaf to large errors."""
 
-from itertools import pairwise
-
 import gymnasium
 import numpy as np
 import pytest
@@ -270,5 +268,5 @@ def test_saved_model_comes_back_with_its_centre(tmp_path):
 def test_same_seed_gives_the_same_weights(arguments):
     first, second = (small(**arguments).learn(60).policy.state_dict() for _ in range(2))
     assert all(torch.equal(first[name], second[name]) for name in first)
-    moved = pairwise(small(**arguments).learn(steps).policy.state_dict()["center.0.weight"] for steps in (20, 60))
-    assert all(not torch.equal(*both) for both in moved)
+    start = small(**arguments).learn(20).policy.state_dict()
+    assert not torch.equal(first["center.0.weight"], start["center.0.weight"])
