@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+pytest.importorskip("stable_baselines3")
+
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import Trajectory
 from agents.learning import clone as cloning
