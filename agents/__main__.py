@@ -152,6 +152,21 @@ def bound(
 
 
 @app.command
+def bounds(tasks: Positional[Path], output: Path, under_table: bool | None = None, workers: int | None = None) -> None:
+    """Finds the bounds of many tasks in processes and writes a CSV; run it again to go on after an interruption.
+
+    Args:
+        tasks: JSON file: a list of objects with the arguments of one environment each.
+        output: CSV file: a row for each task.
+        under_table: As in `bound`.
+        workers: Processes, one task each; as many as there are cores when None.
+    """
+    from agents.optimal.command import solve_file
+
+    solve_file(tasks, output, None if under_table is None else not under_table, workers)
+
+
+@app.command
 def verify(receipt: str | None = None, trust: bool = False) -> None:
     """Checks a checkout, or plays the episodes of a receipt again; exit code 1 where something is wrong.
 

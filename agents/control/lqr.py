@@ -112,7 +112,8 @@ class Linearisation:
         if simulator.elbows:
             poses = simulator.on_table(poses)
             jacobian = constraint_jacobian(simulator.arm, poses, simulator.elbows)
-            rates = rates - (np.linalg.pinv(jacobian) @ (jacobian @ rates[..., None]))[..., 0]
+            turned = np.swapaxes(jacobian, -1, -2)
+            rates = rates - (turned @ np.linalg.solve(jacobian @ turned, jacobian @ rates[..., None]))[..., 0]
         simulator.reset(poses, rates, current)
         simulator.advance(np.ascontiguousarray(volts), self._steps)
         after = np.concatenate([simulator.q, simulator.q_dot, simulator.current], axis=-1)

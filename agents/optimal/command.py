@@ -8,13 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from agents.files import check_writable, read_json, write_csv
+from agents.optimal.batch import bounds
 from agents.optimal.certificate import Bound
 from agents.optimal.search import bound
 from elbow_gym.parameters import as_arm
 from elbow_gym.task.settings import Settings
 
-SOLVES = 12
-"""Solves that a task takes from scratch, for the bar."""
+SOLVES = 8
+"""Lines of progress that a task takes from scratch, for the bar."""
 
 
 def settings_of(
@@ -54,6 +56,50 @@ def solve_and_print(settings: Settings, above_table: bool | None, fresh: bool, o
         print(output)
 
 
+def solve_file(tasks: Path, output: Path, above_table: bool | None, workers: int | None) -> None:
+    """Finds the bounds of the tasks of a file with a bar on stderr, and writes a row for each.
+
+    Args:
+        tasks: JSON list of objects, the arguments of one environment each.
+        output: CSV of the tasks' numbers, what became of them, and the figures.
+        above_table: as in `bound`.
+        workers: processes; as many as there are cores when None.
+
+    Raises:
+        ValueError: the file holds something else, or an environment refuses a task, which is named by its number.
+    """
+    from tqdm import tqdm
+
+    check_writable(output.parent)
+    settings = _settings_in(tasks)
+    with tqdm(total=len(settings), unit="task", file=sys.stderr) as bar:
+        found = bounds(settings, above_table=above_table, workers=workers, progress=lambda _: bar.update())
+    solved = [one for one in found if isinstance(one, Bound)]
+    names = list(solved[0].figures) if solved else []
+    rows = [
+        [k, "solved", *one.figures.values()] if isinstance(one, Bound) else [k, one, *[""] * len(names)]
+        for k, one in enumerate(found)
+    ]
+    write_csv(output, ["task", "status", *names], rows)
+    for k, one in enumerate(found):
+        if not isinstance(one, Bound):
+            print(f"task {k} failed: {one}")
+    print(f"{len(solved)} of {len(found)} tasks solved: {output}")
+
+
+def _settings_in(tasks: Path) -> list[Settings]:
+    plain = read_json(tasks)
+    if not isinstance(plain, list) or not all(isinstance(one, dict) for one in plain):
+        raise ValueError(f"{tasks} must hold a list of objects, the arguments of one environment each")
+    settings: list[Settings] = []
+    for k, arguments in enumerate(plain):
+        try:
+            settings.append(Settings(**{"start_noise": 0.0, **arguments}))
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"task {k} of {tasks}: {error}") from error
+    return settings
+
+
 def lines(found: Bound) -> list[str]:
     """A bound and its certificate for a reader."""
     optimum, certificate = found.optimum, found.certificate
@@ -64,6 +110,7 @@ def lines(found: Bound) -> list[str]:
         f"predicted return      {-optimum.predicted_cost:.6g}, {certificate.replay_error:.2g} of it apart",
         f"mesh change           {certificate.mesh_change:.2g} of the cost",
         f"Lagrangian's gradient {certificate.stationarity:.2g}, conditions met to {certificate.violation:.2g}",
+        f"complementarity       {certificate.complementarity:.2g}",
         f"smoothing             {1e3 * certificate.smoothing:g} mm",
         f"from                  {optimum.guess}, {found.cpu_seconds:.3g} s of CPU time",
     ]

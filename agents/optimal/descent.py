@@ -27,7 +27,7 @@ STAGES = ((0.1, 1e3), (0.03, 1e3), (0.01, 3e3))
 """Smoothings of the tracking error [m] with the prices of depth below the table [1/m^2], one after the other."""
 ITERATIONS = 40
 """Most iterations at one stage."""
-SETTLED = 2e-3
+SETTLED = 4e-3
 """Gain of an iteration, as a share of the cost, below which two in a row end a stage [-]."""
 SHARES = 0.5 ** np.arange(8)
 """Shares of a step that are tried side by side [-]."""
@@ -142,7 +142,9 @@ class Descent:
         simulator, limit = self._simulator, self._settings.voltage_limit
         simulator.reset(self._problem.start)
         now = np.concatenate([simulator.q, simulator.q_dot, simulator.current], axis=-1)
-        reached, applied, whole = [now], [], np.ones(len(SHARES), dtype=bool)
+        reached: list[Array] = [now]
+        applied: list[Array] = []
+        whole = np.ones(len(SHARES), dtype=bool)
         for k, (planned, step, gain) in enumerate(zip(voltage, steps, gains, strict=True)):
             volts = planned + SHARES[:, None] * step - (now - states[k]) @ gain.T
             applied.append(np.ascontiguousarray(np.clip(volts, -limit, limit)))

@@ -18,8 +18,8 @@ from agents.optimal.certificate import Bound, checked
 from agents.optimal.descent import STAGES, Descended, Descent
 from agents.optimal.guesses import posture_guesses, simulated
 from agents.optimal.problem import Problem
-from agents.optimal.solution import SMOOTHINGS, Point, Progress, Solution, SolveError, solve
-from agents.optimal.store import Store
+from agents.optimal.solution import SMOOTHINGS, Point, Progress, Solution, SolveError, solve, variables
+from agents.optimal.store import Neighbour, Store
 from agents.planning.collocation import Transcription
 from agents.workers import Job, Tell, compile_before, in_processes
 from elbow_gym.task.settings import Settings
@@ -29,10 +29,10 @@ COARSE, FINE = 2, 3
 FOLLOWED = 2
 """Most descents that are followed to a solution: the second where the first one's program does not converge."""
 NEAR = 1.5
-"""Distance up to which a task is solved from the variables and multipliers of another one."""
+"""Distance up to which a task is solved from another one alone, with its multipliers."""
 NEIGHBOUR = "neighbour"
 """Name of the nearest solved task among the guesses."""
-CONTINUED_BARRIER = 1e-5
+CONTINUED_BARRIER = 1e-4
 """Barrier that a solve from a task nearby starts with."""
 CONTINUED_ITERATIONS = 40
 """Most iterations from a task nearby: near ones take five to fifteen; where far ones take more than this, the descent
@@ -152,12 +152,19 @@ def _say(progress: Progress, name: str, line: str) -> None:
     progress(f"{name}: {line}")
 
 
-def continued(problem: Problem, start: Point, name: str, progress: Progress) -> tuple[Bound, Solution]:
-    """Solves a problem from the solution of another one nearby; arguments, results and errors as in `certified`."""
-    took, program = _stopwatch(), Transcription(problem, COARSE)
-    say = partial(_say, progress, name)
-    followed = solve(program, start, SMOOTHINGS[-1:], say, CONTINUED_ITERATIONS, CONTINUED_BARRIER)
-    return _finished(program, followed, name, progress, True, took), followed
+def continued(problem: Problem, near: Neighbour, progress: Progress) -> tuple[Bound, Solution]:
+    """Solves a problem from the solution of another one nearby; arguments, results and errors as in `certified`.
+
+    The solution descends to a motion of this problem; its multipliers, where there are some, are still good ones.
+    """
+    took, program, say = _stopwatch(), Transcription(problem, COARSE), partial(_say, progress, NEIGHBOUR)
+    start = Descent(problem)(near.trajectory, STAGES[-1:]).trajectory
+    if near.point is None:
+        followed = solve(program, start, SMOOTHINGS, say)
+    else:
+        point = Point(variables(program, start), near.point.multipliers)
+        followed = solve(program, point, SMOOTHINGS[1:], say, CONTINUED_ITERATIONS, CONTINUED_BARRIER)
+    return _finished(program, followed, NEIGHBOUR, progress, True, took), followed
 
 
 def _stopwatch() -> Callable[..., tuple[float, float]]:
@@ -220,17 +227,18 @@ def bound(
     # The LQR finds its gains with a batch, and one arm plays it.
     compile_before([(settings, 1), settings])
     near = None if fresh else store.nearest(problem)
-    guesses, found = posture_guesses(problem) if near is None or near.distance > NEAR else {}, None
+    guesses: dict[str, Trajectory] = {}
+    found = None
     if near is not None:
         progress(f"nearest solved task: {near.name}, {near.distance:.2g} away")
-        if near.point is not None and near.distance <= NEAR:
-            try:
-                found = continued(problem, near.point, NEIGHBOUR, progress)
-            except SolveError as error:
-                progress(f"{NEIGHBOUR}: {error}")
         guesses[NEIGHBOUR] = near.trajectory
+        if near.distance <= NEAR:
+            try:
+                found = continued(problem, near, progress)
+            except ArithmeticError as error:
+                progress(f"{NEIGHBOUR}: {error}")
     if found is None:
-        found = certified(problem, guesses, progress, parallel=parallel)
+        found = certified(problem, {**posture_guesses(problem), **guesses}, progress, parallel=parallel)
     answer, coarse = found
     if known is not None and known.cost <= answer.cost:
         return known

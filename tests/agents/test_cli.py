@@ -25,6 +25,7 @@ COMMANDS = {
         "publish",
         "evaluate",
         "bound",
+        "bounds",
         "verify",
         "export",
         "dataset",

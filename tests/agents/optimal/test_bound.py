@@ -85,7 +85,7 @@ def test_an_impossible_problem_is_said_to_have_failed(short):
     from agents.optimal.solution import SolveError, solve
 
     program, solution = short
-    with pytest.raises(SolveError, match=r"IPOPT must converge at a smoothing of 0\.03 m, got Maximum_Iterations"):
+    with pytest.raises(SolveError, match=r"IPOPT must converge at a smoothing of 0\.01 m, got Maximum_Iterations"):
         solve(
             program, Trajectory(**{**vars(solution.trajectory), "voltage": solution.trajectory.voltage * 0}), max_iter=1
         )
@@ -117,7 +117,10 @@ def test_residuals_see_what_is_no_solution(short):
     moved = x.copy()
     moved[program.size - 1] += 30.0
     assert program.residuals(moved, solution.smoothing, multipliers)[1] > 1.0
-    assert program.residuals(x, solution.smoothing, (multipliers[0] + 0.5, multipliers[1]))[0] > 0.1
+    priced = program.residuals(x, solution.smoothing, (multipliers[0] + 0.5, multipliers[1]))
+    assert priced[0] > 0.1
+    # Half a unit of cost a volt, of a voltage that is volts away from its limit.
+    assert priced[2] > 1.0
 
 
 def test_payload_enters_the_program_and_the_simulator_agrees(short):

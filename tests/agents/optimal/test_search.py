@@ -6,9 +6,12 @@ import pytest
 from agents import optimal
 from agents.control.trajectory import OpenLoop
 from agents.optimal import certificate, search
-from agents.optimal.guesses import rollout
+from agents.optimal.descent import Descent
+from agents.optimal.guesses import posture_guesses, rollout
+from agents.optimal.problem import Problem
 from agents.optimal.solution import SolveError
 from agents.optimal.store import Store
+from elbow_gym.kinematics import elbow_heights
 from elbow_gym.task.settings import Settings
 
 SHORT = {"start": "on_target", "duration": 0.2, "start_noise": 0.0}
@@ -61,12 +64,52 @@ def test_a_task_nearby_is_solved_from_there_to_the_same_bound(solved):
 
 @pytest.mark.slow
 def test_a_task_with_other_elbows_is_no_neighbour(solved):
-    from agents.optimal.problem import Problem
-
     store, settings, *_ = solved
     assert store.nearest(Problem(settings)).distance == 0.0
     assert store.nearest(Problem(Settings(**SHORT, elbows=1))) is None
     assert store.nearest(Problem(Settings(**SHORT, payload=30.0))) is None
+
+
+@pytest.mark.slow
+def test_a_descent_ends_near_the_optimum_with_a_motion_of_the_simulator(solved):
+    _, settings, found, *_ = solved
+    guess = posture_guesses(Problem(settings))["paper posture"]
+    trajectory = Descent(Problem(settings))(guess).trajectory
+    cost, recording = rollout(settings, lambda env: OpenLoop(env, trajectory))
+    np.testing.assert_allclose(recording.q[:, 0], trajectory.q, rtol=0.0, atol=1e-6)
+    assert found.cost < cost < 1.25 * found.cost
+    assert np.abs(trajectory.voltage).max() <= 24.0
+
+
+@pytest.mark.slow
+def test_a_descent_lifts_joints_above_the_table_and_keeps_to_a_weak_supply():
+    settings = Settings(elbows=0, duration=0.4, voltage_limit=15.0, start_noise=0.0)
+    guess = posture_guesses(Problem(settings))["paper posture"]
+    under, above = (Descent(Problem(settings, above_table=above))(guess) for above in (False, True))
+    lowest = [elbow_heights(settings.parsed_arm, end.trajectory.q, range(3, 12)).min() for end in (under, above)]
+    assert lowest[0] < -0.02
+    assert lowest[1] > -0.01
+    assert above.depth == pytest.approx(-lowest[1])
+    assert np.abs(above.trajectory.voltage).max() == 15.0
+
+
+def test_shipped_optima_are_solved_tasks_to_start_from(tmp_path):
+    near = Store(tmp_path).nearest(Problem(Settings(payload=0.15)))
+    assert (near.name, near.point) == ("elbows2", None)
+    assert near.distance == pytest.approx(1.0)
+    assert near.trajectory.q.shape == (251, 10)
+
+
+@pytest.mark.slow
+def test_many_tasks_are_solved_or_their_failures_named_and_the_store_is_asked_first(solved):
+    store, settings, found, *_ = solved
+    # Nothing can reach a circle that far in a fifth of a second, from where the start pose does not exist.
+    far = Settings(**{**SHORT, "circle": {"center": [1.5, 1.5, 0.9]}})
+    done = []
+    first, second = optimal.bounds([settings, far], store=store, workers=1, progress=done.append)
+    assert first.figures == found.figures
+    assert second.startswith("position must be within reach of the last two links")
+    assert sorted(done) == [0, 1]
 
 
 @pytest.mark.slow
@@ -76,6 +119,7 @@ def test_a_task_with_other_elbows_is_no_neighbour(solved):
         ("REPLAY", "the simulator must reach the cost"),
         ("REFINEMENT", "refining must change the cost by at most"),
         ("STATIONARITY", "the Lagrangian's gradient must be at most"),
+        ("COMPLEMENTARITY", "a bound's multiplier times the distance from it must be at most"),
     ],
 )
 def test_a_check_that_fails_is_named_and_nothing_is_stored(solved, tmp_path, monkeypatch, name, said):

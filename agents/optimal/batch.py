@@ -1,0 +1,58 @@
+"""Bounds of many tasks, side by side in processes; solved ones are taken from the store, so that a run can go on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, wait
+from dataclasses import replace
+from typing import Any
+
+from agents.optimal.certificate import Bound
+from agents.optimal.search import bound
+from agents.optimal.solution import SolveError
+from agents.optimal.store import Store
+from agents.workers import Pool, compile_before, cores
+from elbow_gym.task.settings import Settings
+
+
+def bounds(
+    tasks: Sequence[Settings],
+    *,
+    above_table: bool | None = None,
+    workers: int | None = None,
+    progress: Callable[[int], Any] = lambda _: None,
+    store: Store | None = None,
+) -> list[Bound | str]:
+    """The bound of every task, or why there is none, in the tasks' order.
+
+    Every solved task is in the store at once, and a neighbour for those that start after it. A script needs its
+    `if __name__ == "__main__":`.
+
+    Args:
+        tasks: arguments of `bound`.
+        above_table: as in `bound`.
+        workers: processes, one task each; as many as there are cores when None.
+        progress: called with a task's number when it is done.
+        store: folder of the solved tasks; the checkout's own when None.
+    """
+    store = Store() if store is None else store
+    kernels = {one.elbow_joints: replace(one, circle=None) for one in tasks}
+    # The descent and the LQR step a batch, and one arm plays the solution.
+    compile_before([pair for one in kernels.values() for pair in ((one, 1), one)])
+    found: dict[int, Bound | str] = {}
+    with Pool(min(workers or cores(), max(len(tasks), 1))) as pool:
+        running = {pool.submit(_bound_apart, one, above_table, store): k for k, one in enumerate(tasks)}
+        while running:
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                k = running.pop(future)
+                found[k] = future.result()
+                progress(k)
+    return [found[k] for k in range(len(tasks))]
+
+
+def _bound_apart(settings: Settings, above_table: bool | None, store: Store) -> Bound | str:
+    """`bound` in a process of its own; a failure as its reason, which is no error of the others."""
+    try:
+        return bound(settings, above_table=above_table, store=store)
+    except (SolveError, ValueError) as error:
+        return str(error)
