@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.planning.layout import NAMES, STATE, Layout, collocation_rows, power_form
 from agents.planning.points import Points
-from agents.planning.sparse import casadi_matrix, lagrange
+from agents.planning.sparse import casadi, casadi_matrix, lagrange
 from agents.planning.tail import Tail
 from agents.planning.task import Task
 from elbow_gym.kinematics import hand_position
@@ -50,11 +50,7 @@ class Transcription:
     """
 
     def __init__(self, problem: Task, degree: int, tail: Tail | None = None) -> None:
-        import casadi as ca
-
-        # CasADi from 3.8 on warns of NumPy's functions on its symbols unless told which behaviour is meant.
-        if hasattr(ca.GlobalOptions, "setNumpyMode"):
-            ca.GlobalOptions.setNumpyMode(-1)
+        ca = casadi()
         settings = problem.settings
         self.problem, self.degree = problem, degree
         self.periods, self.period = len(problem.target), settings.control_period
@@ -94,7 +90,7 @@ class Transcription:
 
         points, count, volts = self.points, self.periods * self.degree, self.periods * self.n
         self._power_form = power + sparse.triu(power, 1).T
-        A, P, upper = (casadi_matrix(ca, matrix) for matrix in (rows, self._power_form, power))
+        A, P, upper = (casadi_matrix(matrix) for matrix in (rows, self._power_form, power))
         x = ca.MX.sym("x", self.size)
         aims = 3 * self.periods
         parameters = ca.MX.sym("p", 3 + aims + 3 + self.n)
@@ -123,7 +119,7 @@ class Transcription:
         if tail is not None:
             before, behind = self._voltages - points.size, volts
             of_end = (Z[:, -1], aim[-3:], velocity, smoothing, tracking, energy)
-            written = tail.written(ca, points.size)
+            written = tail.written(points.size)
             cost += written.cost(*of_end)
             slope += ca.vertcat(ca.MX.zeros(before), written.slope(*of_end), ca.MX.zeros(behind))
             block = ca.diagcat(ca.Sparsity(before, before), written.hessian_sparsity, ca.Sparsity(behind, behind))
@@ -162,8 +158,7 @@ class Transcription:
         Returns:
             The variables, the multipliers and IPOPT's statistics.
         """
-        import casadi as ca
-
+        ca = casadi()
         chosen = {**SOLVER, **options}
         warm = {} if multipliers is None else {"lam_x0": multipliers[0], "lam_g0": multipliers[1]}
         if warm:

@@ -8,6 +8,7 @@ import numpy as np
 
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.planning.layout import NAMES
+from agents.planning.sparse import casadi
 
 SETTLING_TIME = 0.05
 """Time constant with which an elbow's height left by the discretisation decays [s]."""
@@ -22,8 +23,7 @@ class Points:
     """
 
     def __init__(self, inverse: InverseDynamics, above_table: bool) -> None:
-        import casadi as ca
-
+        ca = casadi()
         arm, n, p = inverse.arm, inverse.arm.n_joints, len(inverse.elbows)
         q, q_dot, q_ddot, current = (ca.SX.sym(name, 1, n) for name in NAMES[:4])
         force = ca.SX.sym(NAMES[4], 1, p)
@@ -38,7 +38,7 @@ class Points:
         self.equalities, self.conditions = n + p, n + p + len(free)
 
         target, smoothing, weight = ca.SX.sym("target", 3), ca.SX.sym("smoothing"), ca.SX.sym("weight")
-        error = hand(ca, inverse, q) - target
+        error = hand(inverse, q) - target
         cost = weight * ca.sqrt(ca.dot(error, error) + smoothing**2)
         scale, multipliers = ca.SX.sym("scale"), ca.SX.sym("multipliers", self.conditions)
         jacobian = ca.jacobian(conditions, z)
@@ -53,8 +53,9 @@ class Points:
         self.jacobian_sparsity, self.hessian_sparsity = jacobian.sparsity(), hessian.sparsity()
 
 
-def hand(ca: Any, inverse: InverseDynamics, q: Any) -> Any:
+def hand(inverse: InverseDynamics, q: Any) -> Any:
     """Symbolic position of the hand [m], (3, 1), at joint angles [rad], (1, n)."""
+    ca = casadi()
     length, phi = ca.DM(inverse.arm.of_links("length")), ca.mtimes(q, ca.DM(inverse.to_pitch))
     rho = ca.dot(length, ca.sin(phi).T)
     return ca.vertcat(rho * ca.cos(q[0]), rho * ca.sin(q[0]), ca.dot(length, ca.cos(phi).T))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from agents.planning.collocation import Multipliers, Transcription
 from agents.planning.planner import Planner, View
 from agents.planning.task import check_modelled
 from elbow_gym.interface import Environment
+from elbow_gym.kinematics import hand_position
 from elbow_gym.task.settings import Settings
 
 Array = NDArray[np.float64]
@@ -23,9 +23,12 @@ RESTING, BRAKING = 0.5, 0.05
 """Times of the tail [s]."""
 DEGREE = 2
 """Radau points in a control period."""
-SMOOTHING = 0.005
-"""Length that smooths the tracking error e to sqrt(e^2 + SMOOTHING^2) [m]."""
-FIRST_ITERATIONS, ITERATIONS = 200, 30
+SMOOTHING, FAR_SMOOTHING, SHARE = 0.01, 0.05, 0.05
+"""Least and largest length that smooths the tracking error e to sqrt(e^2 + length^2) [m], and its share of the hand's
+distance from the target in between [-]. What is far off needs no sharper one, and the solver then fails less."""
+FIRST_SMOOTHING = 0.1
+"""Length with which a first solve from an arm at rest starts [m]."""
+FIRST_ITERATIONS, ITERATIONS = 200, 20
 """Most iterations in the first control period and in later ones."""
 # The next control period corrects what is left, and a tighter solve wanders in the flat valley of the postures.
 TOLERANCES = {
@@ -92,21 +95,26 @@ class RecedingHorizon(Planner):
         program = self._program
         program.begin(view.state, view.target, view.velocity[-1])
         before = self._plans.get(arm)
-        options: dict[str, Any] = {"max_iter": FIRST_ITERATIONS, **TOLERANCES}
+        hand = hand_position(self.interface.arm, view.state["q"])
+        near = float(np.clip(SHARE * np.linalg.norm(hand - view.target[0]), SMOOTHING, FAR_SMOOTHING))
         if before is None:
             plan = self._resting(view)
+            found = self._solved(plan, FIRST_SMOOTHING, max_iter=FIRST_ITERATIONS)
+            found = found and self._solved(found, near, max_iter=FIRST_ITERATIONS, mu_init=WARM_BARRIER)
         else:
             plan = Plan(*program.later(before.x, before.multipliers))
-            options |= {"max_iter": ITERATIONS, "mu_init": WARM_BARRIER}
-        x, multipliers, stats = program.solve(plan.x, SMOOTHING, plan.multipliers, **options)
-        if stats["return_status"] in SOLVED:
-            plan = Plan(x, multipliers)
-        else:
+            found = self._solved(plan, near, max_iter=ITERATIONS, mu_init=WARM_BARRIER)
+        if found is None:
             # Multipliers of what is no solution would lead the next solve astray, too.
-            plan = Plan(plan.x)
+            found = Plan(plan.x)
             self.failures += 1
-        self._plans[arm] = plan
-        return program.split(plan.x)[1][0]
+        self._plans[arm] = found
+        return program.split(found.x)[1][0]
+
+    def _solved(self, plan: Plan, smoothing: float, **options: float) -> Plan | None:
+        """Solution from a plan; None where the solver does not converge."""
+        x, multipliers, stats = self._program.solve(plan.x, smoothing, plan.multipliers, **TOLERANCES, **options)
+        return Plan(x, multipliers) if stats["return_status"] in SOLVED else None
 
     def _resting(self, view: View) -> Plan:
         """The arm held in its pose with least copper loss."""

@@ -1,4 +1,4 @@
-"""Sparse matrices gathered block by block, and interpolation between the points of two meshes."""
+"""CasADi, sparse matrices gathered block by block, and interpolation between the points of two meshes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+def casadi() -> Any:
+    """The module casadi, told what NumPy's functions on its symbols mean, of which it warns from 3.8 on otherwise."""
+    import casadi as ca
+
+    if hasattr(ca.GlobalOptions, "setNumpyMode"):
+        ca.GlobalOptions.setNumpyMode(-1)
+    return ca
 
 
 def lagrange(nodes: Array, at: Array) -> Array:
@@ -35,8 +44,9 @@ class Triplets:
         return np.concatenate(self._values), (np.concatenate(self._rows), np.concatenate(self._columns))
 
 
-def casadi_matrix(ca: Any, matrix: Any) -> Any:
-    """CasADi's form of a sparse matrix of SciPy's; `ca` is the module casadi."""
+def casadi_matrix(matrix: Any) -> Any:
+    """CasADi's form of a sparse matrix of SciPy's."""
+    ca = casadi()
     matrix = matrix.tocsc()
     matrix.sum_duplicates()
     matrix.sort_indices()

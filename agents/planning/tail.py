@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.planning.points import hand
+from agents.planning.sparse import casadi
 from elbow_gym.kinematics import hand_position
 
 Array = NDArray[np.float64]
@@ -59,18 +60,18 @@ class Tail:
         power = (inverse.resistance * inverse.hold(q).current ** 2).sum(axis=-1)
         return self._periods * (tracking_weight * error + energy_weight * power)
 
-    def written(self, ca: Any, size: int) -> Written:
+    def written(self, size: int) -> Written:
         """`cost` for CasADi, with the smoothed error sqrt(e^2 + smoothing^2).
 
         Args:
-            ca: the module casadi.
             size: length of a collocation point's variables, of which q and q_dot are the first.
         """
+        ca = casadi()
         inverse, n, p = self._inverse, self._inverse.arm.n_joints, len(self._inverse.elbows)
         z, target, velocity = ca.SX.sym("z", size), ca.SX.sym("target", 3), ca.SX.sym("velocity", 3)
         smoothing, tracking, energy = (ca.SX.sym(name) for name in ("smoothing", "tracking", "energy"))
         q, q_dot = z[:n].T, z[n : 2 * n].T
-        error = hand(ca, inverse, q + self._braking * q_dot) - target - self._braking * velocity
+        error = hand(inverse, q + self._braking * q_dot) - target - self._braking * velocity
         # sum R i^2 with the elbow forces of least loss: what remains of the torque without the elbows' part.
         root = ca.DM(np.diag(np.sqrt(inverse.resistance) / inverse.torque_constant))
         held = ca.mtimes(inverse.holding_torque(q), root)

@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from agents.evaluation import players
-from agents.evaluation.players import CLASSICAL, ELBOW_COUNTS, Entry, entries, find_player, player_of
+from agents.evaluation.players import (
+    CLASSICAL,
+    ELBOW_COUNTS,
+    PLANNERS,
+    Entry,
+    entries,
+    find_player,
+    known_names,
+    player_of,
+)
 from agents.evaluation.regimes import in_all_regimes
 from agents.shipped.seeds import load_policy
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES, SPARE_COLOURS
@@ -123,3 +132,16 @@ def test_classical_player_on_the_table_resolves_its_contacts():
     assert fastest * player.settings.substeps.max() < 1.0
     clipped = find_player("pd", env=players.TABLE_ENV)
     assert isinstance(clipped.make(ElbowArmVectorEnv(1, **clipped.settings.arguments)), PDController)
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_planners_are_found_by_name_and_play_with_the_policies_but_not_with_everybody(name):
+    assert name in known_names(1)
+    assert name not in {entry.name for entry in entries()}
+    player = find_player(name, 1, arguments={"payload": 0.1})
+    assert player.settings == Settings(elbows=1, payload=0.1)
+    assert player.identity.startswith(name)
+    assert Entry(name, 1).player().settings == Settings(elbows=1)
+    others = {entry.name for entry in entries()} | set(PLANNERS) - {name}
+    for table in (CONTROLLER_NAMES, CONTROLLER_COLOURS, CONTROLLER_MARKERS):
+        assert table[name] not in {table[other] for other in others}

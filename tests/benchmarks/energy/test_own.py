@@ -128,3 +128,21 @@ def test_score_gives_a_small_table_from_python():
     assert [line.split()[0] for line in lines[2:]] == ["clone", "still"]
     with pytest.raises(ValueError, match=r"^beside must hold names of .* got 'nobody'"):
         benchmarks.score(Still, beside=["nobody"])
+
+
+def test_planners_play_where_they_are_named(monkeypatch):
+    found = {}
+    monkeypatch.setattr(run, "measure", lambda chosen, _: found.update(cells=chosen.cells) or [])
+    monkeypatch.setattr(run, "cells", lambda parts: [Cell("ppo", 2), Cell("ppo", 1)])
+    for name in ("save", "check_writable"):
+        monkeypatch.setattr(run, name, lambda *_: None)
+    monkeypatch.setattr(run.effort, "save", lambda *_: None)
+    monkeypatch.setattr(run.terminal, "report", lambda *_: "")
+    measure_own(TaskOptions(elbows=2), ["sampling_mpc", "mine=pd"], trust=False)
+    assert [(cell.controller, cell.elbows) for cell in found["cells"]] == [("ppo", 2), ("sampling_mpc", 2), ("mine", 2)]
+    assert featured("sampling_mpc")
+    with pytest.raises(ValueError, match=r"^--publish must be given without --with"):
+        measure_own(TaskOptions(elbows=None), ["sampling_mpc"], trust=False, publish=True)
+    cells = own_arm_cells({"arm": six_joint_arm(), "elbows": (4,)}, planners=["receding_horizon"])
+    assert cells[-1].controller == "receding_horizon"
+    assert players(cells[-1])[0].settings.parsed_arm == six_joint_arm()
