@@ -10,7 +10,7 @@ os.environ["SDL_VIDEODRIVER"] = "dummy"
 import pytest
 from hypothesis import HealthCheck, settings
 
-from elbow_gym import paper_arm
+from elbow_gym import paper_arm, simulator
 from elbow_gym.kernel.build import kernel
 from tests.support.kernel_calls import shared
 
@@ -33,23 +33,15 @@ def pytest_collection_modifyitems(items):
             item.add_marker("slow")
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _shared_kernels():
-    """Simulators with some switches on step in the kernel that has all of them.
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    """Lets simulators with some switches on step in the kernel that has all of them, but for what is soak or timing.
 
-    Each kernel takes 8 to 17 s of CPU to compile. That a switch which has nothing to do changes no bit, and that every
-    kernel has the bits of its source, are laws of their own (laws/test_switches.py).
+    Each kernel takes 8 to 17 s of CPU to compile. That a switch which has nothing to do changes no bit, that every
+    kernel has the bits of its source, and which kernel a simulator asks for are laws of their own.
     """
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("elbow_gym.simulator.kernel", shared)
-        yield
-
-
-@pytest.fixture(autouse=True)
-def _own_kernels_in_soak(request, monkeypatch):
-    """What is soak steps in the kernels that users have."""
-    if request.node.get_closest_marker("soak") or request.node.get_closest_marker("timing"):
-        monkeypatch.setattr("elbow_gym.simulator.kernel", kernel)
+    own = item.get_closest_marker("soak") or item.get_closest_marker("timing")
+    simulator.kernel = kernel if own else shared
 
 
 @pytest.fixture(scope="session")
