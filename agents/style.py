@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,17 @@ def look(name: str) -> tuple[str, str, str]:
 def elbow_name(elbows: int) -> str:
     """A number of elbows in words."""
     return ELBOW_NAMES.get(elbows, f"{elbows} elbows")
+
+
+def joints_in_words(joints: Sequence[int]) -> str:
+    """Joint numbers, at least one, such as "joint 4" or "joints 4 and 7"."""
+    first, last = ", ".join(map(str, joints[:-1])), str(joints[-1])
+    return f"joints {first} and {last}" if first else f"joint {last}"
+
+
+def leaning_in_words(elbow_joints: Sequence[int]) -> str:
+    """Joints that are held on the table, such as "elbows on joints 4 and 7"; "no elbow" without one."""
+    return f"elbows on {joints_in_words(elbow_joints)}" if elbow_joints else elbow_name(0)
 
 
 def elbow_colour(elbows: int) -> str:

@@ -159,8 +159,13 @@ def economical_pose(arm: ArmParameters, elbows: tuple[int, ...], circle: Circle)
 
     Only poses count that the arm can move to with its elbows on the table; the start pose where none is found.
     """
-    found = [posture.pose for posture in best_postures(arm, elbows, circle) if leads_to(arm, elbows, posture.pose)]
-    return found[0] if found else on_table(arm, arm.nominal_pose, elbows)
+    start = on_table(arm, arm.nominal_pose, elbows)
+    try:
+        postures = best_postures(arm, elbows, circle)
+    # No posture serves the whole circle with all joints above the table.
+    except ValueError:
+        return start
+    return next((posture.pose for posture in postures if leads_to(arm, elbows, posture.pose)), start)
 
 
 def economical_computed_torque(env: Environment) -> ComputedTorque:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -23,7 +24,7 @@ SPREAD = 1.0
 BEND = 0.2
 """Least bend of the last joint [rad]: stretched, the hand could not follow both ways."""
 LARGEST = np.pi
-"""Bound of every angle [rad]."""
+"""Bound of every angle [rad], twice that of the last two joints where no posture keeps to it."""
 WAY_STEPS = 200
 """Steps of the way from the start pose to a posture."""
 LEAST_LEVER = 0.02
@@ -116,26 +117,42 @@ def best_postures(
     conditions = [_condition("eq", held), _condition("ineq", bent)]
     if above_table:
         conditions.append(_condition("ineq", above))
-    rng = np.random.default_rng(seed)
-    found: list[Posture] = []
-    for k in range(starts):
-        idle = np.clip(nominal[1:-2] + (rng.normal(scale=SPREAD, size=n - 3) if k else 0.0), -3.0, 3.0)
-        guess = np.concatenate([idle, np.tile(nominal[-2:], CIRCLE_POINTS)])
-        # BLAS adds up in another order on more threads, and where a flat valley's search ends shows it.
-        with threadpool_limits(1, user_api="blas"):
-            best = minimize(
-                lambda angles: float(loss(angles)),
-                guess,
-                method="SLSQP",
-                jac=partial(slopes, loss),
-                constraints=conditions,
-                bounds=[(-LARGEST, LARGEST)] * guess.size,
-                options={"maxiter": 300, "ftol": 1e-6},
-            )
-        met = all((c["fun"](best.x) > -1e-6).all() for c in conditions) and (np.abs(held(best.x)) < 1e-6).all()
-        if met:
-            pose = inverse_kinematics(arm, poses(best.x)[0], start)[0]
-            found.append(Posture(pose, float(best.fun)))
+
+    def following(idle: Array) -> Array:
+        """Angles of the last two joints that follow the circle, a pair for each point; ValueError where none do."""
+        q = inverse_kinematics(arm, np.concatenate([nominal[:1], idle, nominal[-2:]]), target)[0]
+        return np.unwrap(q[:, -2:], axis=0).ravel()
+
+    def searched(again: bool) -> list[Posture]:
+        """Postures of all searches; again: from poses that follow the circle, over more than a turn of joint n-1."""
+        limit = 2.0 * LARGEST if again else LARGEST
+        rng = np.random.default_rng(seed)
+        found: list[Posture] = []
+        for k in range(starts):
+            idle = np.clip(nominal[1:-2] + (rng.normal(scale=SPREAD, size=n - 3) if k else 0.0), -3.0, 3.0)
+            pairs = np.tile(nominal[-2:], CIRCLE_POINTS)
+            if again:
+                with suppress(ValueError):
+                    pairs = following(idle)
+            guess = np.concatenate([idle, pairs])
+            # BLAS adds up in another order on more threads, and where a flat valley's search ends shows it.
+            with threadpool_limits(1, user_api="blas"):
+                best = minimize(
+                    lambda angles: float(loss(angles)),
+                    guess,
+                    method="SLSQP",
+                    jac=partial(slopes, loss),
+                    constraints=conditions,
+                    bounds=[(-LARGEST, LARGEST)] * (n - 3) + [(-limit, limit)] * (2 * CIRCLE_POINTS),
+                    options={"maxiter": 300, "ftol": 1e-6},
+                )
+            met = all((c["fun"](best.x) > -1e-6).all() for c in conditions) and (np.abs(held(best.x)) < 1e-6).all()
+            if met:
+                pose = inverse_kinematics(arm, poses(best.x)[0], start)[0]
+                found.append(Posture(pose, float(best.fun)))
+        return found
+
+    found = searched(again=False) or searched(again=True)
     if not found:
         raise ValueError(
             f"circle must allow a posture with the elbows {tuple(elbows)} down, got none in {starts} searches"

@@ -12,6 +12,7 @@ from agents.evaluation.own import KINDS
 from agents.evaluation.players import find_player, known_names
 from agents.evaluation.receipt import player_again, read_receipt, receipt, verify
 from agents.evaluation.regimes import BENCHMARK_SEEDS, in_all_regimes, print_results
+from agents.style import leaning_in_words
 from agents.task_options import TaskOptions
 
 
@@ -41,8 +42,8 @@ def evaluate_all(names: Sequence[str], task: TaskOptions, episodes: int, trust: 
             asked = {"what": name, "env": task.env, "elbows": task.elbows, "arguments": arguments}
             print(json.dumps(receipt(asked, player, seeds, results)))
             continue
-        elbow_joints = player.settings.elbow_joints
-        print_results(f"{player.label}, elbows {elbow_joints}, {episodes} episodes: mean ± standard deviation", results)
+        elbows = leaning_in_words(player.settings.elbow_joints)
+        print_results(f"{player.label}, {elbows}, {episodes} episodes: mean ± standard deviation", results)
         print(f"A decision takes {1e3 * decision_time(player):.3g} ms of CPU time here, for one arm.")
 
 

@@ -60,8 +60,8 @@ def read_model(path: Path, env: ElbowArmVectorEnv) -> SavedModel:
     if data is None or "policy_class" not in data or "policy" not in parameters:
         raise ValueError(f"{path} must be a model that Stable-Baselines3 has saved, got another .zip")
     for name, own in (("observation", env.single_observation_space), ("action", env.single_action_space)):
-        if data[f"{name}_space"] != own:
-            raise ValueError(f"{name} space of {path} must be the environment's {own}, got {data[f'{name}_space']}")
+        if (given := data[f"{name}_space"]) != own:
+            raise ValueError(f"{name} space of {path} must be the environment's {_shown(own)}, got {_shown(given)}")
     options = {"use_sde": True} if data.get("use_sde") else {}
     policy = data["policy_class"](
         data["observation_space"], data["action_space"], lambda _: 0.0, **{**options, **data["policy_kwargs"]}
@@ -76,3 +76,9 @@ def read_model(path: Path, env: ElbowArmVectorEnv) -> SavedModel:
         # PPO and A2C have one class of policies.
         algorithm = "PPO" if "clip_range" in data else "A2C"
     return SavedModel(algorithm, policy, statistics)
+
+
+def _shown(space: Any) -> str:
+    """A space in words: its shape alone where its bounds differ between the entries, of which there may be many."""
+    text = str(space)
+    return text if "\n" not in text and len(text) < 80 else f"{type(space).__name__} of shape {space.shape}"

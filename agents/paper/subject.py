@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from agents.style import elbow_name
+from agents.style import elbow_name, leaning_in_words
 from agents.task_options import circle_in_words
 from agents.tasks import Elbows
 from elbow_gym.kinematics import on_table
@@ -79,14 +79,8 @@ class Subject:
 
     def described(self) -> str:
         """The arm, its elbows and its circle in words."""
-        elbows = listed(self.elbow_joints)
-        return f"{self.name} with {self.arm.n_joints} joints, elbows on {elbows}, {circle_in_words(self.circle)}"
-
-
-def listed(joints: Sequence[int]) -> str:
-    """Joint numbers in words, such as "joints 4 and 7"."""
-    first, last = ", ".join(map(str, joints[:-1])), str(joints[-1])
-    return f"joints {first} and {last}" if first else f"joint {last}"
+        elbows = leaning_in_words(self.elbow_joints)
+        return f"{self.name} with {self.arm.n_joints} joints, {elbows}, {circle_in_words(self.circle)}"
 
 
 def cases_in_words(cases: Sequence[int]) -> str:

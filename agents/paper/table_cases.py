@@ -12,7 +12,8 @@ from agents.evaluation.metrics import metrics
 from agents.evaluation.recording import Array, Recording, instant
 from agents.paper.cases import RECORD_PERIOD
 from agents.paper.figures import SETTLED
-from agents.paper.subject import Subject, listed
+from agents.paper.subject import Subject
+from agents.style import joints_in_words
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
 from elbow_gym.kinematics import hand_position, inverse_kinematics, nearest_turn, radii
 from elbow_gym.parameters import ArmParameters
@@ -38,7 +39,7 @@ def lifts(subject: Subject) -> dict[str, tuple[float, ...]]:
     joints, lift = subject.elbow_joints, LIFT * float(subject.arm.of_links("length")[1:].mean())
     found = {}
     for leaning in subject.cases:
-        name = listed(joints[:leaning]) if leaning else CLEAR
+        name = joints_in_words(joints[:leaning]) if leaning else CLEAR
         found[name] = tuple(lift * max(0, number - leaning) for number in range(1, len(joints) + 1))
     return found
 

@@ -15,7 +15,7 @@ from agents.evaluation.players import CLASSICAL
 from agents.optimal.guesses import rollout
 from elbow_gym import ElbowArmEnv, Simulator
 from elbow_gym.baselines.pd import CLIPPED
-from elbow_gym.kinematics import hand_position, inverse_kinematics, joint_positions
+from elbow_gym.kinematics import hand_position, inverse_kinematics, joint_positions, on_table
 from elbow_gym.task.circle import Circle
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
@@ -97,6 +97,14 @@ def test_economical_pose_keeps_the_elbows_down_and_costs_less_than_the_papers(ar
         for q in (pose, arm.nominal_pose)
     )
     assert mine < 0.75 * papers
+
+
+def test_economical_pose_is_the_start_where_no_posture_serves_the_circle(arm, monkeypatch):
+    def refuse(*_):
+        raise ValueError("circle must allow a posture with the elbows (5,) down, got none in 12 searches")
+
+    monkeypatch.setattr(classical, "best_postures", refuse)
+    np.testing.assert_array_equal(economical_pose(arm, (5,), Circle()), on_table(arm, arm.nominal_pose, (5,)))
 
 
 @pytest.mark.parametrize("name", ["pd", "pd_smooth", "pd_gravity", "computed_torque"])

@@ -1,12 +1,13 @@
 """Slopes of the posture's search are those of the functions, and its steps stay within the bounds."""
 
 import numpy as np
+import pytest
 
 from agents.control.inverse_dynamics import InverseDynamics
-from agents.control.posture import LARGEST, leads_to, slopes
+from agents.control.posture import LARGEST, best_postures, leads_to, slopes
 from elbow_gym.kinematics import elbow_heights, inverse_kinematics, on_table, pitches
 from elbow_gym.task.default_circle import default_circle
-from tests.support.arms import six_joint_arm
+from tests.support.arms import shortened, six_joint_arm
 
 
 def test_slopes_are_the_derivatives_of_many_values_and_of_one():
@@ -53,3 +54,17 @@ def test_posture_on_the_other_side_of_an_elbow_is_not_moved_to():
     folded = start * np.array([1.0, -1.0, -1.0, 1.0, 1.0, 1.0]) + np.array([0.0, 0.0, 2.0 * np.pi, 0.0, 0.0, 0.0])
     np.testing.assert_allclose(elbow_heights(arm, folded, (4,)), 0.0, atol=1e-9)
     assert not leads_to(arm, (4,), folded)
+
+
+@pytest.mark.slow
+def test_a_posture_is_found_where_joint_n_minus_1_comes_to_half_a_turn_on_its_way():
+    # Its elbow is under the middle of the circle, so that the last two links stand up from it and lean over both ways.
+    arm = shortened(six_joint_arm(), 5)
+    circle = default_circle(arm, (4,))
+    start = on_table(arm, arm.nominal_pose, (4,))
+    angle = np.linspace(0.0, 2.0 * np.pi, 9)
+    turned = inverse_kinematics(arm, start, circle.position(angle))[0][:, -2]
+    assert turned.min() < -LARGEST < turned.max()
+    best = best_postures(arm, (4,), circle, starts=2)[0]
+    np.testing.assert_allclose(elbow_heights(arm, best.pose, (4,)), 0.0, atol=1e-5)
+    assert leads_to(arm, (4,), best.pose)

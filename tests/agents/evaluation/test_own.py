@@ -156,6 +156,9 @@ def test_model_of_stable_baselines3_acts_as_it_does_there(here, algorithm):
     other = find_player("model.zip", 2, arguments={"action_unit": "volt"}, trust=True)
     with pytest.raises(ValueError, match=r"^action space of model.zip must be the environment's Box\(-24"):
         other.make(ElbowArmVectorEnv(1, **other.settings.arguments))
+    heated = find_player("model.zip", 2, arguments={"heat": True}, trust=True)
+    with pytest.raises(ValueError, match=r"the environment's Box of shape \(51,\), got Box of shape \(41,\)$"):
+        heated.make(ElbowArmVectorEnv(1, **heated.settings.arguments))
 
 
 @pytest.mark.slow

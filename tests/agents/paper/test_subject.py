@@ -10,9 +10,9 @@ import pytest
 from agents.paper import cases as reproduce
 from agents.paper.claims import OTHER_ARM
 from agents.paper.figures import figures
-from agents.paper.subject import Subject, cases_in_words, listed
+from agents.paper.subject import Subject, cases_in_words
 from agents.paper.table_cases import lifts, start_pose
-from agents.style import pyplot
+from agents.style import joints_in_words, leaning_in_words, pyplot
 from elbow_gym import paper_arm
 from elbow_gym.kinematics import hand_position, joint_positions
 from tests.support.arms import six_joint_arm
@@ -64,11 +64,8 @@ def test_no_elbow_and_an_elbow_that_the_arm_has_not_are_refused(path):
 
 
 def test_words():
-    assert [listed(joints) for joints in ((4,), (4, 7), (3, 5, 8))] == [
-        "joint 4",
-        "joints 4 and 7",
-        "joints 3, 5 and 8",
-    ]
+    assert [joints_in_words(joints) for joints in ((4,), (3, 5, 8))] == ["joint 4", "joints 3, 5 and 8"]
+    assert [leaning_in_words(joints) for joints in ((), (4, 7))] == ["no elbow", "elbows on joints 4 and 7"]
     assert cases_in_words((3, 2, 1, 0)) == "3 / two / one / no elbow"
 
 
