@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.control.posture import slopes
 from agents.planning.approach import ARRIVALS, approaches
 from agents.planning.branches import Branches
 from agents.planning.planner import Planner, View, shifted
 from elbow_gym.checks import positive_integer
 from elbow_gym.interface import Environment
+from elbow_gym.kinematics import hand_position
 
 Array = NDArray[np.float64]
 
 HORIZON = 0.24
 """Time that a plan looks ahead [s]."""
-RESTING, BRAKING = 0.5, 0.05
+RESTING, BRAKING = 1.0, 0.05
 """Times of the tail [s]."""
 KNOTS = 3
 """Instants whose voltages are drawn; between them they are interpolated."""
-SAMPLES, ROUNDS = 64, 3
+SAMPLES, ROUNDS = 128, 3
 """Plans played side by side, and how often in a control period."""
 BEST = 16
 """Number of plans whose weighted mean gives the direction of the next step."""
@@ -29,12 +32,12 @@ STRIDES = (0.0, 0.2, 0.4, 0.7, 1.0, 1.5, 2.2)
 """Lengths of the steps that are tried along it, as multiples."""
 SPREAD = 3.0
 """Standard deviation of the drawn voltages at the start [V]."""
-SMALLEST, LARGEST = 0.05, 5.0
-"""Bounds of that standard deviation [V]."""
+SMALLEST, LARGEST = 0.3, 5.0
+"""Bounds of a standard deviation [V]."""
 VARIETY = 0.5
 """Standard deviation of its logarithm between samples, from which the next one is learned."""
 GROWTH = 1.1
-"""Factor of the standard deviation from one control period to the next."""
+"""Factor of the standard deviations from one control period to the next."""
 RESTART = 1.0
 """Least standard deviation where an approach takes the plan's place [V]."""
 
@@ -44,16 +47,18 @@ class Plan(NamedTuple):
 
     voltage: Array
     """Voltages of the control periods [V], (N, n)."""
-    spread: float
-    """Standard deviation at the knots [V]."""
+    spread: Array
+    """Standard deviations at the knots [V]: of voltages that move the hand, and of those that only change the
+    posture."""
 
 
 class Sampling(Planner):
     """Model-predictive control by sampling, after MPPI and evolution strategies.
 
-    The plan of the period before, shifted, is changed by smooth random voltages. The better half counts with weights
-    that fall with the rank; a step along their mean is taken as far as it pays. The spread of the samples adapts
-    itself. In the first round, computed torque's approaches to the path compete.
+    The plan of the period before, shifted, is changed by smooth random voltages. The best samples count with weights that
+    fall with the rank; a step along their mean is taken as far as it pays. Voltages that move the hand and those that
+    only change the posture have spreads of their own, which adapt themselves. In the first round, computed torque's
+    approaches to the path compete.
 
     Args:
         env: the environment that it will act in.
@@ -88,12 +93,12 @@ class Sampling(Planner):
         n = self.interface.arm.n_joints
         before = self._plans.get(arm)
         if before is None:
-            plan = Plan(np.zeros((self.periods, n)), SPREAD)
+            plan = Plan(np.zeros((self.periods, n)), np.full(2, SPREAD))
         else:
-            plan = Plan(shifted(before.voltage), min(GROWTH * before.spread, LARGEST))
-        guesses = self._guesses(view)
+            plan = Plan(shifted(before.voltage), np.minimum(GROWTH * before.spread, LARGEST))
+        guesses, sides = self._guesses(view), self._sides(view)
         for _ in range(self._rounds):
-            plan = self._improved(plan, view, guesses, rng)
+            plan = self._improved(plan, view, guesses, sides, rng)
             guesses = guesses[:0]
         self._plans[arm] = plan
         return plan.voltage[0]
@@ -105,14 +110,24 @@ class Sampling(Planner):
         found = approaches(self.inverse, view, interface.pose, self.periods, interface.control_period)
         return np.concatenate([np.tile(still, (1, self.periods, 1)), found])
 
-    def _improved(self, plan: Plan, view: View, guesses: Array, rng: np.random.Generator) -> Plan:
+    def _sides(self, view: View) -> Array:
+        """Projections of voltages, (2, n, n), onto those that move the hand, and onto the others.
+
+        Against the back-EMF a voltage is nearly a rate.
+        """
+        jacobian = slopes(partial(hand_position, self.interface.arm), view.state["q"])
+        moving = np.linalg.pinv(jacobian) @ jacobian
+        return np.stack([moving, np.eye(len(moving)) - moving])
+
+    def _improved(self, plan: Plan, view: View, guesses: Array, sides: Array, rng: np.random.Generator) -> Plan:
         """A plan that costs no more, after one round of samples."""
         free, limit = self._samples - len(guesses), self.interface.voltage_limit
         half = (free + 1) // 2
         # In opposite pairs, whose mean is the plan.
         noise = rng.normal(size=(half, KNOTS, plan.voltage.shape[1]))
-        variety = np.concatenate([rng.normal(size=half)] * 2)[:free]
-        changes = np.concatenate([noise, -noise])[:free] * (plan.spread * np.exp(VARIETY * variety))[:, None, None]
+        variety = np.concatenate([rng.normal(size=(half, 2))] * 2)[:free]
+        scale = plan.spread * np.exp(VARIETY * variety)
+        changes = np.einsum("skn,sg,gnm->skm", np.concatenate([noise, -noise])[:free], scale, sides)
         drawn = plan.voltage + np.einsum("hk,skn->shn", self._smooth, changes)
         plans = np.clip(np.concatenate([guesses, drawn]), -limit, limit)
         order = np.argsort(self._branches.costs(view, plans), kind="stable")[: len(self._weights)]
@@ -124,7 +139,7 @@ class Sampling(Planner):
         # The best samples tell by their own spreads which one the next samples should have.
         share = self._weights[own].sum()
         lesson = self._weights[own] @ variety[order[own] - len(guesses)] / share if share > 0.2 else 0.0
-        spread = float(np.clip(plan.spread * np.exp(VARIETY * lesson), SMALLEST, LARGEST))
+        spread = np.clip(plan.spread * np.exp(VARIETY * lesson), SMALLEST, LARGEST)
         if chosen == len(STRIDES) and order[0] < len(guesses):
-            spread = max(spread, RESTART)
+            spread = np.maximum(spread, RESTART)
         return Plan(tried[chosen], spread)

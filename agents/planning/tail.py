@@ -29,6 +29,10 @@ class Written(NamedTuple):
     hessian_sparsity: Any
 
 
+SPEED = 0.05
+"""Price of a joint's rate at a plan's end [s^2/rad^2], without which a plan throws the arm into a cheap last pose."""
+
+
 class Tail:
     """Cost of the time after a plan, in units of the return.
 
@@ -58,7 +62,8 @@ class Tail:
         inverse, ahead = self._inverse, target + self._braking * velocity
         error = np.linalg.norm(hand_position(inverse.arm, q + self._braking * q_dot) - ahead, axis=-1)
         power = (inverse.resistance * inverse.hold(q).current ** 2).sum(axis=-1)
-        return self._periods * (tracking_weight * error + energy_weight * power)
+        thrown = SPEED * (q_dot**2).sum(axis=-1)
+        return self._periods * (tracking_weight * error + energy_weight * power) + thrown
 
     def written(self, size: int) -> Written:
         """`cost` for CasADi, with the smoothed error sqrt(e^2 + smoothing^2).
@@ -81,6 +86,7 @@ class Tail:
             along = ca.mtimes(unit, held.T)
             power -= ca.dot(along, ca.solve(ca.mtimes(unit, unit.T), along))
         cost = self._periods * (tracking * ca.sqrt(ca.dot(error, error) + smoothing**2) + energy * power)
+        cost += SPEED * ca.dot(q_dot, q_dot)
         seen = [z, target, velocity, smoothing, tracking, energy]
         hessian = ca.triu(ca.hessian(cost, z)[0])
         return Written(

@@ -62,11 +62,11 @@ def test_rounds_and_samples_make_no_plan_dearer():
     for samples in (16, 64):
         planner = Sampling(env, **{**FEW, "samples": samples})
         view, rng = planner._views(observation[None])[0], np.random.default_rng(0)
-        guesses = planner._guesses(view)
-        plan = Plan(np.zeros((planner.periods, 10)), sampling.SPREAD)
+        guesses, sides = planner._guesses(view), planner._sides(view)
+        plan = Plan(np.zeros((planner.periods, 10)), np.full(2, sampling.SPREAD))
         found = []
         for _ in range(4):
-            plan = planner._improved(plan, view, guesses, rng)
+            plan = planner._improved(plan, view, guesses, sides, rng)
             tried = np.repeat(plan.voltage[None], len(sampling.STRIDES) + 1, axis=0)
             found.append(planner._branches.costs(view, tried)[0])
         assert (np.diff(found) <= 0.0).all()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from agents.control.inverse_dynamics import InverseDynamics
-from agents.planning.tail import Tail
+from agents.planning.tail import SPEED, Tail
 from elbow_gym import Simulator, paper_arm
 from elbow_gym.kinematics import hand_position, on_table
 
@@ -37,8 +37,9 @@ def test_a_hand_that_keeps_up_with_the_target_is_on_it():
     tail, q, q_dot = Tail(inverse, 0.02, 0.5, 1e-4), pose(()), np.random.default_rng(1).normal(size=10)
     hand, step = hand_position(paper_arm(), q), 1e-6
     velocity = (hand_position(paper_arm(), q + step * q_dot) - hand) / step
-    assert tail.cost(q, q_dot, hand, velocity, 1.0, 0.0) < 1e-5
-    assert tail.cost(q, q_dot, hand, 0.0 * velocity, 1.0, 0.0) > 1e-3
+    thrown = SPEED * (q_dot**2).sum()
+    assert tail.cost(q, q_dot, hand, velocity, 1.0, 0.0) - thrown < 1e-5
+    assert tail.cost(q, q_dot, hand, 0.0 * velocity, 1.0, 0.0) - thrown > 1e-3
 
 
 @pytest.mark.parametrize("count", ELBOWS)
