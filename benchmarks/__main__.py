@@ -93,21 +93,23 @@ def optimal(
 
 
 @app.command
-def planners(output: Path = LATEST, drawn: Count = 10, elbows: int = 2, publish: bool = False) -> None:
+def planners(
+    output: Path = LATEST, drawn: Count = 10, elbows: int = 2, solve: bool = False, publish: bool = False
+) -> None:
     """Receding-horizon and sampling control beside PPO, computed torque and the bound, also on tasks drawn at random.
 
-    Takes about a quarter of an hour of CPU time. Bounds of drawn tasks are those that `python -m agents bound` has
-    stored.
+    Takes some minutes of CPU time; what was played with the same code is not played again.
 
     Args:
         output: Folder for the table.
         drawn: Number of drawn tasks: circles, loads and starts.
         elbows: Elbows on the table in the drawn tasks, 0, 1 or 2.
+        solve: Whether to seek the bounds of drawn tasks that are not stored; otherwise they are left out.
         publish: Whether to write the results to benchmarks/results and the table into the README.
     """
     from benchmarks.planners import planners as measure_planners
 
-    print(measure_planners(output, drawn, elbows, publish))
+    print(measure_planners(output, drawn, elbows, solve, publish))
 
 
 @app.command_from

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections.abc import Sequence
@@ -20,13 +21,16 @@ from agents.evaluation.player import Player
 from agents.evaluation.players import ELBOW_COUNTS, find_player
 from agents.evaluation.recording import record
 from agents.files import write_csv, write_text
+from agents.optimal.batch import bounds
 from agents.optimal.problem import Problem
 from agents.optimal.store import Store
 from agents.style import look
+from agents.tasks import plain_arguments
 from agents.workers import Job, Tell, compile_before, in_processes
 from benchmarks.blocks import publish_blocks
+from benchmarks.energy import cache
 from benchmarks.energy.markdown import significant
-from benchmarks.machine import RESULTS
+from benchmarks.machine import CACHE, RESULTS
 from benchmarks.optimal import Cell, cached
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
@@ -41,14 +45,13 @@ RADIUS, PERIOD, PAYLOAD = (0.05, 0.15), (3.0, 8.0), (0.0, 0.3)
 LATER = 2.0
 """Time from which the hand is taken to be on its path [s]."""
 NOMINAL = "nominal"
-HEADER = (
-    "task", "elbows", "controller", "return [-]", "energy [J]", "error_rms [mm]", "decision [ms]", "failures [-]",
-    "bound [-]",
-)  # fmt: skip
-"""Columns of the CSV; the error counts from `LATER` on."""
+FIGURES = ("return [-]", "energy [J]", "error_rms [mm]", "decision [ms]", "failures [-]")
+"""Figures of an episode; the error counts from `LATER` on, and a failure is a period without a plan of its own."""
+HEADER = ("task", "elbows", "controller", *FIGURES, "bound [-]")
+"""Columns of the CSV."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Task:
     """An environment's arguments, from a start without noise."""
 
@@ -56,13 +59,18 @@ class Task:
     elbows: int
     arguments: dict[str, Any]
 
+    @property
+    def settings(self) -> Settings:
+        """Arguments of the environment at the default control rate."""
+        return Settings(elbows=self.elbows, **self.arguments)
+
     def bound(self) -> float | None:
         """The best known negative return; None where none was sought or found."""
         if self.name == NOMINAL:
             figures = cached(Cell(self.elbows, "paper"))
         else:
             try:
-                stored = Store().load(Problem(Settings(elbows=self.elbows, **self.arguments), self.elbows < 2))
+                stored = Store().load(Problem(self.settings, self.elbows < 2))
             except ValueError:
                 # No start pose of this task has the hand on the circle.
                 return None
@@ -126,8 +134,8 @@ def playable(tasks: Sequence[Task], count: int) -> list[Task]:
     return found[:count]
 
 
-def play(task: Task, player: Player) -> list[Any]:
-    """A row under `HEADER`."""
+def play(task: Task, player: Player) -> dict[str, float]:
+    """Figures of an episode, by the names in `FIGURES`."""
     from threadpoolctl import threadpool_limits
 
     made: list[Timed] = []
@@ -140,35 +148,41 @@ def play(task: Task, player: Player) -> list[Any]:
     with threadpool_limits(1):
         recording = record(replace(player.settings, **task.arguments), make, [0])
     whole, later = metrics(recording), metrics(recording, LATER)
-    bound = task.bound()
-    return [
-        task.name,
-        task.elbows,
-        player.name,
-        f"{whole['return'][0]:.6g}",
-        f"{whole['electrical_energy'][0]:.6g}",
-        f"{later['error_rms'][0]:.6g}",
-        f"{1e3 * np.median(made[0].seconds):.3g}",
-        getattr(made[0].inner, "failures", ""),
-        "" if bound is None else f"{-bound:.6g}",
-    ]
+    figures = (
+        whole["return"][0],
+        whole["electrical_energy"][0],
+        later["error_rms"][0],
+        1e3 * np.median(made[0].seconds),
+        getattr(made[0].inner, "failures", 0),
+    )
+    return dict(zip(FIGURES, map(float, figures), strict=True))
 
 
-def _played(task: Task, name: str, tell: Tell) -> list[Any]:
-    """A row, played in a process of its own."""
-    row = play(task, find_player(name, task.elbows))
+def _played(task: Task, name: str, folder: Path, tell: Tell) -> dict[str, float]:
+    """Figures of an episode, from the folder where the same was played before."""
+    player = find_player(name, task.elbows)
+    question = {"player": player.identity, "settings": plain_arguments(player.settings), "task": task.arguments}
+    key = cache.key(json.loads(json.dumps(question)))
+    stored = cache.load(key, folder)
+    if stored is None:
+        stored = {NOMINAL: {figure: np.array([value]) for figure, value in play(task, player).items()}}
+        cache.store(key, stored, folder)
     tell(1)
-    return row
+    return {figure: float(values[0]) for figure, values in stored[NOMINAL].items()}
 
 
-def planners(output: Path, drawn: int, elbows: int, publish: bool) -> str:
+def planners(
+    output: Path, drawn: int, elbows: int, solve: bool = False, publish: bool = False, folder: Path = CACHE
+) -> str:
     """Plays `PLAYERS` on the nominal tasks and on drawn ones; writes planners.csv and .md. Returns the table.
 
     Args:
         output: folder of the results, unless they are published.
         drawn: number of drawn tasks.
         elbows: elbows of the drawn tasks.
+        solve: whether bounds of drawn tasks that were not sought before are sought now.
         publish: whether the results go to benchmarks/results, and the table into the README.
+        folder: folder of what was played before.
 
     Raises:
         ValueError: CasADi is missing.
@@ -181,15 +195,26 @@ def planners(output: Path, drawn: int, elbows: int, publish: bool) -> str:
     tasks = [Task(NOMINAL, count, {"start_noise": 0.0}) for count in ELBOW_COUNTS]
     # A task whose start pose cannot reach its circle is passed over.
     tasks += playable(drawn_tasks(2 * drawn, elbows), drawn)
-    pairs = [(task, name) for task in tasks for name in PLAYERS]
     players = [find_player(name, count) for name in PLAYERS for count in ELBOW_COUNTS]
     compile_before([*((player.settings, 1) for player in players), *(player.settings for player in players)])
-    jobs = {(task.name, task.elbows, name): Job(partial(_played, task, name), 1) for task, name in pairs}
+    jobs = {(task, name): Job(partial(_played, task, name, folder), 1) for task in tasks for name in PLAYERS}
     with tqdm(total=len(jobs), unit="episode", file=sys.stderr) as bar:
-        done = in_processes(jobs, bar.update)
-    found = [done[key] for key in jobs]
-    write_csv(output / "planners.csv", HEADER, found)
-    text = table(found)
+        played = in_processes(jobs, bar.update)
+    if solve:
+        bounds([task.settings for task in tasks if task.name != NOMINAL])
+    known = {task: task.bound() for task in tasks}
+    rows = [
+        [
+            task.name,
+            task.elbows,
+            name,
+            *(f"{played[task, name][figure]:.6g}" for figure in FIGURES),
+            "" if known[task] is None else f"{-known[task]:.6g}",
+        ]
+        for task, name in jobs
+    ]
+    write_csv(output / "planners.csv", HEADER, rows)
+    text = table(rows)
     write_text(output / "planners.md", text)
     if publish:
         publish_blocks(output)

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 HORIZON = 0.3
 """Time that a plan looks ahead [s]."""
-RESTING, BRAKING = 0.5, 0.05
+RESTING, BRAKING = 1.0, 0.05
 """Times of the tail [s]."""
 DEGREE = 2
 """Radau points in a control period."""

@@ -55,10 +55,10 @@ class Plan(NamedTuple):
 class Sampling(Planner):
     """Model-predictive control by sampling, after MPPI and evolution strategies.
 
-    The plan of the period before, shifted, is changed by smooth random voltages. The best samples count with weights that
-    fall with the rank; a step along their mean is taken as far as it pays. Voltages that move the hand and those that
-    only change the posture have spreads of their own, which adapt themselves. In the first round, computed torque's
-    approaches to the path compete.
+    The plan of the period before, shifted, is changed by smooth random voltages. The best samples count with weights
+    that fall with the rank; a step along their mean is taken as far as it pays. Voltages that move the hand and those
+    that only change the posture have spreads of their own, which adapt themselves. In the first round, computed
+    torque's approaches to the path compete.
 
     Args:
         env: the environment that it will act in.

@@ -29,7 +29,7 @@ class Written(NamedTuple):
     hessian_sparsity: Any
 
 
-SPEED = 0.05
+SPEED = 0.02
 """Price of a joint's rate at a plan's end [s^2/rad^2], without which a plan throws the arm into a cheap last pose."""
 
 

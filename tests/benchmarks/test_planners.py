@@ -9,7 +9,8 @@ from agents.evaluation.metrics import metrics
 from agents.evaluation.player import player_of
 from agents.evaluation.players import find_player
 from agents.evaluation.recording import record
-from benchmarks.planners import HEADER, NOMINAL, Task, drawn_tasks, play, playable, table
+from benchmarks import planners as module
+from benchmarks.planners import FIGURES, HEADER, NOMINAL, Task, drawn_tasks, planners, play, playable, table
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -45,15 +46,34 @@ class Still:
         return np.zeros((self.num_envs, 10), np.float32), None
 
 
-def test_row_is_the_players_own_episode_with_the_bound_beside_it():
+def test_figures_are_the_players_own_episode():
     player = player_of("still", find_player("ppo", 2).settings, Still)
-    row = dict(zip(HEADER, play(Task(NOMINAL, 2, {"start_noise": 0.0, "duration": 2.1}), player), strict=True))
+    found = play(Task(NOMINAL, 2, {"start_noise": 0.0, "duration": 2.1}), player)
     expected = metrics(record(replace(player.settings, start_noise=0.0, duration=2.1), Still, [0]))
-    assert float(row["return [-]"]) == pytest.approx(expected["return"][0], rel=1e-5)
-    assert float(row["energy [J]"]) == pytest.approx(expected["electrical_energy"][0], rel=1e-5)
-    assert float(row["decision [ms]"]) > 0.0
-    assert row["failures [-]"] == 3
-    assert float(row["bound [-]"]) == pytest.approx(-30.1, abs=0.1)
+    assert found["return [-]"] == expected["return"][0]
+    assert found["energy [J]"] == expected["electrical_energy"][0]
+    assert found["decision [ms]"] > 0.0
+    assert found["failures [-]"] == 3.0
+
+
+def test_bound_of_the_nominal_task_is_the_shipped_optimums():
+    assert Task(NOMINAL, 2, {}).bound() == pytest.approx(30.1, abs=0.1)
+
+
+def test_planners_table_is_made_of_its_rows_and_episodes_are_played_once(tmp_path, monkeypatch):
+    pytest.importorskip("casadi")
+    counted = []
+    monkeypatch.setattr(module, "PLAYERS", ("ppo",))
+    monkeypatch.setattr(module, "ELBOW_COUNTS", (2,))
+    monkeypatch.setattr(module, "in_processes", lambda jobs, tell: {key: job.work(tell) for key, job in jobs.items()})
+    monkeypatch.setattr(module, "play", lambda task, player: counted.append(task.name) or dict.fromkeys(FIGURES, 1.5))
+    for _ in range(2):
+        text = planners(tmp_path / "out", 2, 2, folder=tmp_path / "cache")
+    assert counted == [NOMINAL, "0", "1"]
+    assert (tmp_path / "out" / "planners.md").read_text() == text
+    rows = (tmp_path / "out" / "planners.csv").read_text().splitlines()
+    assert rows[0].split(",") == list(HEADER)
+    assert rows[1].startswith("nominal,2,ppo,1.5,1.5,1.5,1.5,1.5,-30")
 
 
 def test_table_has_nominal_rows_and_means_of_the_drawn_ones():
