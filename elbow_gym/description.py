@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from inspect import getdoc
@@ -10,12 +12,25 @@ from elbow_gym.env import ElbowArmEnv
 from elbow_gym.kernel.cache import folder
 from elbow_gym.task.settings import Settings
 
+INDENT = 2
+"""Indent of the lines of a part [characters]."""
+LEAST_WIDTH = 24
+"""Width of a table's last column at least [characters]."""
+
 
 def table(rows: Iterable[Sequence[object]]) -> list[str]:
-    """Lines of a table whose columns are as wide as their widest entry."""
+    """Lines of a table whose columns are as wide as their widest entry; the last is broken at the terminal's width."""
     texts = [[str(entry) for entry in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*texts, strict=True)]
-    return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in texts]
+    left = sum(widths[:-1]) + 2 * (len(widths) - 1)
+    wrapper = textwrap.TextWrapper(
+        max(left + LEAST_WIDTH, shutil.get_terminal_size().columns - INDENT),
+        subsequent_indent=" " * left,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    lines = ("  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)) for row in texts)
+    return [part for line in lines for part in wrapper.wrap(line.rstrip())]
 
 
 def argument_rows() -> list[tuple[str, str, str]]:
@@ -53,4 +68,4 @@ def describe(ids: Sequence[str]) -> str:
         ),
         "Cache of the compiled kernel": [str(folder() or "nowhere: no folder can be written")],
     }
-    return "\n\n".join("\n".join([title, *(f"  {line}" for line in lines)]) for title, lines in parts.items())
+    return "\n\n".join("\n".join([title, *(" " * INDENT + line for line in lines)]) for title, lines in parts.items())

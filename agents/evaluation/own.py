@@ -80,6 +80,8 @@ def own_player(
         trained = task_settings(env, elbows, arguments) if contract is None else _settings(contract, elbows, arguments)
         return player_of(name, trained, partial(OnnxModel, path), identity=_digest(path))
     policy = read_policy(path)
+    # A run is known by its folder, whose best policies all have one name.
+    name = path.parent.name if path.name == BEST and path.parent.name else name
     return policy_player(name, policy, _settings(policy.card.environment, elbows, arguments))
 
 

@@ -78,8 +78,19 @@ def test_interrupted_program_and_one_whose_output_is_not_taken_end_without_a_tra
         assert ended.value.code == code
 
 
-def test_info_tells_ids_arguments_and_observations(capsys):
+def test_info_tells_ids_arguments_and_observations(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
     main(["info"])
     told = capsys.readouterr().out
     assert all(f"\n  {name}" in told for name in [*ids(), *(field.name for field in fields(Settings))])
     assert "\n  lookahead_error  36..38   m      0.5    10.0   hand minus the target 0.1 s later" in told
+
+
+def test_info_keeps_to_the_terminals_width(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    main(["info"])
+    told = capsys.readouterr().out.splitlines()
+    # The path of the cache is the last line.
+    assert max(map(len, told[:-1])) <= 80
+    first = next(k for k, line in enumerate(told) if line.startswith("  arm "))
+    assert told[first + 1].split() == ["`ArmParameters`,", "or", "its", "JSON", "dict"]

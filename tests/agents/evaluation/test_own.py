@@ -82,6 +82,7 @@ def test_folder_of_a_run_is_found_as_the_training_prints_it(here):
         assert player.identity == load_policy(source).card.digest
         assert player.settings == load_policy(source).settings
     assert find_player("ppo_elbows2_seed2").label == "ppo_elbows2_seed2"
+    assert find_player("runs/ppo_elbows2_seed2/best").label == "ppo_elbows2_seed2"
     with pytest.raises(ValueError, match=r"^elbows must be 2 as in the policy's training, got 1"):
         find_player("ppo_elbows2_seed2", 1)
 
