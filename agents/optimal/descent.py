@@ -28,11 +28,13 @@ STAGES = ((0.1, 1e3), (0.03, 1e3), (0.01, 3e3))
 ITERATIONS = 40
 """Most iterations at one stage."""
 SETTLED = 4e-3
-"""Gain of an iteration, as a share of the cost, below which two in a row end a stage [-]."""
+"""Gain of an iteration, as a share of the cost, below which two in a row end a stage, or five of dear steps [-]."""
 SHARES = 0.5 ** np.arange(8)
 """Shares of a step that are tried side by side [-]."""
 LEAST, MOST = 1e-7, 10.0
 """Range of the price of a step [cost/V^2]."""
+CHEAP = 1e-5
+"""Price of a step up to which it is nearly as long as without one [cost/V^2]."""
 CLEARANCE = 0.002
 """Height above the table from which on depth is counted [m], so that what is left of it is above the table."""
 REGULAR = 1e-4
@@ -130,8 +132,10 @@ class Descent:
                     break
                 continue
             small = small + 1 if cost - found[2] < SETTLED * cost else 0
-            (states, voltage, cost), slopes, price = found, None, max(LEAST, 0.3 * price)
-            if small == 2:
+            # Steps that are short because they are dear say little about what is left to gain.
+            settled = small == (2 if price <= CHEAP else 5)
+            (states, voltage, cost), slopes, price = found, None, max(LEAST, 0.1 * price)
+            if settled:
                 break
         return states, voltage, cost
 

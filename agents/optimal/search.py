@@ -18,7 +18,7 @@ from agents.optimal.certificate import Bound, checked
 from agents.optimal.descent import STAGES, Descended, Descent
 from agents.optimal.guesses import posture_guesses, simulated
 from agents.optimal.problem import Problem
-from agents.optimal.solution import SMOOTHINGS, Point, Progress, Solution, SolveError, solve, variables
+from agents.optimal.solution import SMOOTHINGS, Point, Progress, Solution, SolveError, solve
 from agents.optimal.store import Neighbour, Store
 from agents.planning.collocation import Transcription
 from agents.workers import Job, Tell, compile_before, in_processes
@@ -155,15 +155,13 @@ def _say(progress: Progress, name: str, line: str) -> None:
 def continued(problem: Problem, near: Neighbour, progress: Progress) -> tuple[Bound, Solution]:
     """Solves a problem from the solution of another one nearby; arguments, results and errors as in `certified`.
 
-    The solution descends to a motion of this problem; its multipliers, where there are some, are still good ones.
+    From its variables and multipliers the program needs about twenty iterations; without them it descends first.
     """
     took, program, say = _stopwatch(), Transcription(problem, COARSE), partial(_say, progress, NEIGHBOUR)
-    start = Descent(problem)(near.trajectory, STAGES[-1:]).trajectory
     if near.point is None:
-        followed = solve(program, start, SMOOTHINGS, say)
+        followed = solve(program, Descent(problem)(near.trajectory, STAGES[1:]).trajectory, SMOOTHINGS, say)
     else:
-        point = Point(variables(program, start), near.point.multipliers)
-        followed = solve(program, point, SMOOTHINGS[1:], say, CONTINUED_ITERATIONS, CONTINUED_BARRIER)
+        followed = solve(program, near.point, SMOOTHINGS, say, CONTINUED_ITERATIONS, CONTINUED_BARRIER)
     return _finished(program, followed, NEIGHBOUR, progress, True, took), followed
 
 
