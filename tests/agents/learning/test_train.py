@@ -129,10 +129,15 @@ def test_run_that_was_cut_off_goes_on_to_the_same_policy(done, tmp_path, monkeyp
 
 @pytest.mark.slow
 def test_sac_that_was_cut_off_goes_on_to_the_same_policy(tmp_path, monkeypatch):
-    whole = small_run(tmp_path / "whole", **SAC_KILLED)
-    cut = small_run(tmp_path / "cut", checkpoint_seconds=0.0, **SAC_KILLED)
+    whole, cut = (small_run(tmp_path / name, **SAC_KILLED) for name in ("whole", "cut"))
     train(whole)
-    cut_down(cut, monkeypatch)
+    checkpoint = Keeper.checkpoint
+    with monkeypatch.context() as patch:
+        # One every 200 steps: a checkpoint takes longer than many steps.
+        patch.setattr(
+            Keeper, "checkpoint", lambda keeper, model: model.num_timesteps % 200 or checkpoint(keeper, model)
+        )
+        cut_down(replace(cut, checkpoint_seconds=0.0), monkeypatch)
     assert_goes_on_to_the_same_policy(whole, cut, 600, monkeypatch)
 
 
