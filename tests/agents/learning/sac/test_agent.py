@@ -184,9 +184,9 @@ def test_deterministic_predictions_are_the_average_and_others_the_actor():
 def test_proximity_holds_the_actor_to_the_centre():
     def departure(proximity):
         model = small(proximity=proximity, learning_rate=3e-3, center_tau=0.0)
-        model.learn(200)
+        model.learn(100)
         mean = torch.nn.Sequential(*model.actor.latent_pi, model.actor.mu, torch.nn.Tanh())
-        observation = torch.from_numpy(model.replay_buffer.observations[:200, 0])
+        observation = torch.from_numpy(model.replay_buffer.observations[:100, 0])
         return (mean(observation) - model.policy.center(observation)).abs().mean().item()
 
     assert departure(1e4) < 0.2 * departure(0.0)
