@@ -107,13 +107,13 @@ def real(value: Any) -> Any:
 def as_numbers(name: str, value: ArrayLike, *shapes: tuple[int, ...]) -> NDArray[np.float64]:
     """The value as a contiguous float64 array; ValueError naming `name` unless it is numbers of one of the shapes."""
     try:
-        array = np.asarray(real(value), dtype=np.float64, order="C")
+        # A copy is aligned and can be written: Numba would compile the kernel again for arrays that are not.
+        array = np.array(real(value), dtype=np.float64, order="C")
     except (OverflowError, TypeError, ValueError) as error:
         raise ValueError(f"{name} must be numbers of shape {_listed(shapes)}, got {shown(value)}") from error
     if array.shape not in shapes:
         raise ValueError(f"{name} must have shape {_listed(shapes)}, got {array.shape}")
-    # Numba would compile the kernel again for arrays that cannot be written, or are not aligned.
-    return array if array.flags.behaved else array.copy()
+    return array
 
 
 def as_batch(name: str, value: ArrayLike, shape: tuple[int, int]) -> NDArray[np.float64]:

@@ -18,7 +18,6 @@ from elbow_gym.rendering.screen import can_draw
 from elbow_gym.rendering.viewer import RENDER_MODES, Viewer
 from elbow_gym.task.attributes import TaskAttributes, check_arguments
 from elbow_gym.task.episodes import Episodes
-from elbow_gym.task.infos import of_arm
 from elbow_gym.task.saved_state import checked_marks, number_of_arms
 from elbow_gym.task.settings import Settings
 
@@ -177,21 +176,21 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
         self._ready = True
         self._viewer.restart()
         snapshot = self._episodes.observe()
-        return snapshot.observation[0], of_arm(self._episodes.info(snapshot))
+        return snapshot.observation[0], self._episodes.info(snapshot, arm=0)
 
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One control period. Raises ValueError, with the state untouched, on a wrong shape or NaN."""
         if not self._ready:
             raise gym.error.ResetNeeded("reset must be called before step")
         array = as_numbers("action", action, (self._episodes.arm.n_joints,))
-        outcome = self._episodes.step(array[None])
+        outcome = self._episodes.step(array[None], arm=0)
         self._viewer.follow()
         return (
-            outcome.observation[0],
-            outcome.reward.item(),
-            outcome.terminated.item(),
-            outcome.truncated.item(),
-            of_arm(outcome.info),
+            outcome.observation,
+            float(outcome.reward),
+            bool(outcome.terminated),
+            bool(outcome.truncated),
+            outcome.info,
         )
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]

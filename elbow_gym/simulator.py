@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from elbow_gym.checks import as_batch, positive, positive_integer
-from elbow_gym.kernel import observe
-from elbow_gym.kernel.build import announced, kernel
+from elbow_gym.kernel.build import kernel
 from elbow_gym.kernel.rows import (
     LARGEST_ANGLE,
     MAXIMUM_ELBOWS,
@@ -105,12 +104,11 @@ class Simulator(Readings):
         # Up to two arms the lanes of a block would mostly idle.
         lanes = 1 if self.num_envs <= 2 else BLOCK_LANES
         self._kernel = kernel(lanes, **self._switches)
-        self._called: set[str] = set()
         self._sharing = Sharing(self.num_envs, lanes, self._num_threads)
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the compiled functions and the threads, for pickling and copying."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("_kernel", "_called", "_sharing")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("_kernel", "_sharing")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -166,8 +164,7 @@ class Simulator(Readings):
         """
         settled = as_batch("q", q, (self.num_envs, self.arm.n_joints)).copy()
         if self.elbows:
-            with announced():
-                self._kernel.project_poses(settled, self._parameters, self._elbow_index)
+            self._kernel.project_poses(settled, self._parameters, self._elbow_index)
             if not (np.abs(settled).max() < LARGEST_ANGLE):
                 raise ValueError(f"q must be near a pose with the elbows {self.elbows} at z = 0, got {q!r}")
             check_on_table(self.elbows, settled, np.zeros_like(settled), self._parameters[:, 0])
@@ -214,7 +211,8 @@ class Simulator(Readings):
 
         For callers that made the checks of `step`: a contiguous float64 (B, n) of finite volts.
         """
-        self._share("advance", self._state, self._parameters, voltage, self._elbow_index, steps, self._summary)
+        own = (self._state, self._parameters, voltage, self._elbow_index, steps, self._summary)
+        self._sharing.total(self._kernel.advance, *own)
 
     def control_step(self, actions: tuple[Array, ...], steps: Array, task: tuple[NDArray[Any], ...]) -> int:
         """One control period of every arm, from actions to observations and rewards.
@@ -232,7 +230,7 @@ class Simulator(Readings):
         if self._num_threads > 1 and np.isnan(actions[0]).any():
             return -1
         own = (self._state, self._parameters, self._elbow_index, steps, self._summary, self._clock)
-        invalid = self._share("control_step", *actions, *own, *task)
+        invalid = self._sharing.total(self._kernel.control_step, *actions, *own, *task)
         return self._taken_again(actions[1], steps, task) if invalid > 0 else invalid
 
     def _taken_again(self, voltage: Array, steps: Array, task: tuple[NDArray[Any], ...]) -> int:
@@ -247,23 +245,17 @@ class Simulator(Readings):
                 one = (int(arm), int(arm) + 1)
                 moved = (self._state, self._parameters, voltage, self._elbow_index, finer, self._summary)
                 if not self._kernel.advance(*moved, *one):
-                    observe.observe(self._state, self._summary, self._clock, *task, *one)
+                    self._kernel.observe(*self.raw, *task, first=one[0], end=one[1])
         return int((~self.valid).sum())
+
+    def observe(self, task: tuple[NDArray[Any], ...]) -> None:
+        """Observations and figures of every arm as it is; `task` is that of `control_step`."""
+        self._kernel.observe(*self.raw, *task, first=0, end=self.num_envs)
 
     @property
     def raw(self) -> tuple[Array, Array, NDArray[np.int64]]:
         """The kernel's own state, summary and clock arrays, for functions that only read them."""
         return self._state, self._summary, self._clock
-
-    def _share(self, name: str, *arguments: Any) -> int:
-        """Calls an entry of the kernel for every thread's share of the arms; the sum of what they return."""
-        entry = getattr(self._kernel, name)
-        if name in self._called:
-            return self._sharing.total(entry, *arguments)
-        with announced():
-            total = self._sharing.total(entry, *arguments)
-        self._called.add(name)
-        return total
 
     def close(self) -> None:
         """Ends the threads. May be called twice; what steps afterwards starts them again."""

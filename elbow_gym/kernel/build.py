@@ -1,11 +1,7 @@
 """Kernels for a lane count and a set of switches, compiled when first asked for or taken from the cache."""
 
-import sys
-from collections.abc import Generator
-from contextlib import contextmanager
 from functools import cache
-from threading import Timer
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +10,6 @@ from elbow_gym.kernel import control, entries
 from elbow_gym.kernel.slots import offsets
 from elbow_gym.kernel.template import Entry, compiled, instances, sources
 from elbow_gym.parameters import Array
-
-PATIENCE = 2.0
-"""Compilations that take longer [s] are announced."""
 
 
 class Kernel(NamedTuple):
@@ -43,6 +36,17 @@ class Kernel(NamedTuple):
         """
         own = (state, parameters, elbows, steps, summary)
         return self.control_step(voltage, voltage, control.NO_QUEUE, *own, *control.NO_TASK, first, end)
+
+    def observe(
+        self, state: Array, summary: Array, clock: NDArray[np.int64], *task: NDArray[Any], first: int, end: int
+    ) -> None:
+        """Observations and figures of arms first..end-1 as they are: a `control_step` without motion.
+
+        Arguments are those of `control_step`; `task` is all that comes behind the clock.
+        """
+        still = (control.NO_PARAMETERS, control.NO_ELBOWS, control.NO_STEPS)
+        own = (state, *still, summary, clock)
+        self.control_step(control.NO_VOLTAGE, control.NO_VOLTAGE, control.NO_QUEUE, *own, *task, first, end)
 
 
 def kernel(
@@ -79,17 +83,3 @@ def assemble(lanes: int, compile_with: Entry, **switches: bool) -> Kernel:
     return Kernel(
         *(made[entry.__name__] for entry in (control.control_step, entries.accelerations, entries.project_poses))
     )
-
-
-@contextmanager
-def announced() -> Generator[None]:
-    """Says so when what is called inside is compiled and that takes a while."""
-    message = "elbow_gym: compiling its kernel for this machine, once; later starts take it from the cache"
-    notice = Timer(PATIENCE, print, (message,), {"file": sys.stderr, "flush": True})
-    notice.daemon = True
-    notice.start()
-    try:
-        yield
-    finally:
-        notice.cancel()
-        notice.join()

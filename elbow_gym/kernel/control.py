@@ -42,8 +42,9 @@ def control_step(
 ):  # fmt: skip
     """One control period of arms first..end-1: volts of actions, steps, observation and reward.
 
-    Without steps, the summary is that of the present state. An arm whose state leaves the representable keeps its old
-    state and summary, with VALID at zero. From clock on, arguments are those of `observe`.
+    Without steps, the summary is that of the present state, and without rows of voltages it stays. An arm whose state
+    leaves the representable keeps its old state and summary, with VALID at zero. From clock on, arguments are those of
+    `observe`.
 
     Args:
         action: actions (B, n), in their unit.
@@ -55,14 +56,14 @@ def control_step(
         elbows: joint numbers of the elbows, (p,).
         steps: lengths of the steps [s].
         summary: filled, (B, SUMMARY_COLUMNS + p).
-        clock: moved on by a control period, (B, 2), unless observations have no columns.
+        clock: moved on by a control period, (B, 2), where actions are read.
         task: also the largest actions, the volts per unit of action and the delays.
         observation: filled, unless it has no columns.
 
     Returns:
         The number of arms that are not VALID; -1, with nothing changed, where an action is not a number.
     """
-    n = action.shape[1]
+    n = state.shape[2]
     if queue.shape[1] > 0:
         for b in range(first, end):
             for a in range(n):
@@ -75,17 +76,19 @@ def control_step(
                     queue[b, d, a] = queue[b, d - 1, a]
                 queue[b, 0, a] = min(max(action[b, a], -highest), highest) * task[b, VOLTS]
                 voltage[b, a] = queue[b, int(task[b, DELAY]), a]
-    invalid = run(state, parameters, voltage, elbows, steps, summary, first, end)
-    if observation.shape[1] > 0:
-        for b in range(first, end):
             clock[b, PERIODS] += 1
+    invalid = 0
+    if voltage.shape[0] > 0:
+        invalid = run(state, parameters, voltage, elbows, steps, summary, first, end)
+    if observation.shape[1] > 0:
         observe(
             state, summary, clock, task, path, pose, starts, scales, price, observation, figures, first, end
         )  # fmt: skip
     return invalid
 
 
-NO_QUEUE = np.zeros((0, 0, 0))
+NO_QUEUE, NO_VOLTAGE = np.zeros((0, 0, 0)), np.zeros((0, 0))
+NO_PARAMETERS, NO_ELBOWS, NO_STEPS = np.zeros((0, 0, 0)), np.zeros(0, np.int64), np.zeros(0)
 # Clock to figures of a call that only moves the arms.
 NO_TASK = (
     np.zeros((0, 2), np.int64), np.zeros((0, TASK_COLUMNS)), np.zeros((0, 0, 3)), np.zeros(0), np.zeros(0, np.int64),

@@ -7,13 +7,16 @@ from __future__ import annotations
 import hashlib
 import pickle
 import sys
-from collections.abc import Generator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.compiler_lock import global_compiler_lock
+
+from elbow_gym.kernel.compilation import compiling
 
 try:
     import fcntl
@@ -107,20 +110,21 @@ def held(path: Path) -> Generator[None]:
 
 
 def stored(dispatcher: Any) -> Any:
-    """The dispatcher of a compiled function, with its compiled forms on disk.
+    """The dispatcher of a compiled function, with its compiled forms on disk, where a folder can be written.
 
     Of processes that need a form at the same time, one compiles it and the others wait for it.
-
-    Raises RuntimeError where no folder can be written.
     """
     if not hasattr(dispatcher, "py_func"):
         return dispatcher
-    dispatcher._cache = cache = EntryCache(dispatcher.py_func)
+    others: Callable[[], AbstractContextManager[None]] = nullcontext
+    with suppress(RuntimeError):
+        dispatcher._cache = cache = EntryCache(dispatcher.py_func)
+        others = partial(held, cache.path.with_suffix(".lock"))
     compile_here = dispatcher.compile
 
     def compile_alone(signature: Any) -> Any:
         # The compiler's own lock comes first, so that two threads never wait for each other's.
-        with global_compiler_lock, held(cache.path.with_suffix(".lock")):
+        with global_compiler_lock, compiling(dispatcher.typingctx), others():
             return compile_here(signature)
 
     dispatcher.compile = compile_alone

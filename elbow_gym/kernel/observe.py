@@ -63,7 +63,7 @@ def _put(observation, b, m, scales, value):
     observation[b, m] = min(max(np.float32(value / scales[0, m]), -high), high)
 
 
-@compiled_entry
+@compiled
 def observe(
     state, summary, clock, task, path, pose, starts, scales, price, observation, figures, first, end,
 ):  # fmt: skip

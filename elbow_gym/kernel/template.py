@@ -52,7 +52,7 @@ def template(
 
 
 def compiled(function: Any, *, cached: bool = False, inlined: bool = False, flat: bool = False) -> Any:
-    """The compiled function, without a cache on disk where no folder can be written.
+    """The compiled function, with a cache on disk if it is `cached` and a folder can be written.
 
     Python can call it only if it is `cached`: the wrappers that calls from Python go through are half of what there is
     to compile for a short function.
@@ -63,10 +63,7 @@ def compiled(function: Any, *, cached: bool = False, inlined: bool = False, flat
     if not cached:
         options["no_cpython_wrapper"] = True
         return njit(**options)(function)
-    try:
-        return stored(njit(**options)(function))
-    except RuntimeError:
-        return njit(**options)(function)
+    return stored(njit(**options)(function))
 
 
 @cache

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from elbow_gym.checks import as_dict, require_entries
-from elbow_gym.kernel import observe
 from elbow_gym.kernel.rows import FIGURES, PAID, PARAMETERS, RESIDUAL, SUMMARY_COLUMNS, TASK_COLUMNS
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.parameters import Array
@@ -18,6 +17,8 @@ from elbow_gym.simulator import Simulator
 from elbow_gym.task.actuation import Actuation
 from elbow_gym.task.arm_batch import Population
 from elbow_gym.task.circle import check_reachable
+from elbow_gym.task.draws import Draws
+from elbow_gym.task.infos import of_arm
 from elbow_gym.task.reward import Price, early_end
 from elbow_gym.task.saved_state import check_basis, checked_rows, rows_of
 from elbow_gym.task.sensing import Sensing, Snapshot, blank
@@ -27,7 +28,9 @@ from elbow_gym.task.targets import Targets
 
 RESET_OPTIONS = ("state", "phase", "circle", "parameters")
 # The last figure is the reward itself.
-INFO_FIGURES = FIGURES[:-1]
+*INFO_FIGURES, _ = FIGURES
+REWARD = len(INFO_FIGURES)
+ALL = slice(None)
 
 
 class Outcome(NamedTuple):
@@ -79,7 +82,7 @@ class Episodes:
         self._substeps = settings.substeps
         self.horizon = settings.horizon if longest is None else min(settings.horizon, longest)
         """Control periods after which an episode is truncated."""
-        self._arms_differ, self._circles_differ = bool(settings.randomization.ranges), self.circle.random
+        self._draws = Draws(self.population, self.targets, self.circle.random)
         if settings.start == "on_target" and not self.circle.random:
             inverse_kinematics(self.arm, self.pose, self.circle.position(np.linspace(0.0, 2.0 * np.pi, 73)))
         # Arrays that every control period reads and resets bring up to date in place.
@@ -166,15 +169,11 @@ class Episodes:
             for generator, state_before in zip(drawing, undrawn, strict=True):
                 generator.bit_generator.state = state_before
             raise
-        self._arms_differ = self._differing()
         self.targets.put(chosen, circles)
+        self._draws.renew()
         self.actuation.reset(chosen)
         self.sensing.set_noise(chosen, drawing)
         self._task[chosen, PAID] = 0.0
-
-    def _differing(self) -> bool:
-        """Whether infos tell the arms' parameters: they are drawn, or some arm was given others than the nominal."""
-        return bool(self.population.randomization.ranges) or self.population.changed
 
     def _draw_arms(self, generators: Sequence[np.random.Generator], chosen: NDArray[np.int64], given: Any) -> None:
         if given is None and not self.population.randomization.ranges and not self.population.changed:
@@ -189,14 +188,14 @@ class Episodes:
         if given is not None:
             self.settings.check_steps("parameters", rows, values["supply_voltage"])
 
-    def step(self, action: Array, waiting: NDArray[np.bool_] | None = None) -> Outcome:
-        """One control period under `action`, held and clipped to the supply voltage.
+    def step(self, action: Array, waiting: NDArray[np.bool_] | None = None, arm: int | slice = ALL) -> Outcome:
+        """One control period under `action`, held and clipped to the supply voltage; the outcome is that of `arm`.
 
         The action is in its unit, contiguous float64 (B, n). Arms that wait for their reset draw no noise.
 
         Raises ValueError, with the state untouched, when an action is not a number.
         """
-        snapshot, voltage = blank(self.num_envs, self._size), np.empty_like(action)
+        snapshot, voltage = blank(self.num_envs, self._size), np.empty(action.shape)
         invalid = self.simulator.control_step(
             (action, voltage, self.actuation.queue), self._substeps, (*self._asked, self._price, *snapshot)
         )
@@ -204,13 +203,13 @@ class Episodes:
             raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
         self.sensing.complete(snapshot.observation, waiting)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
-        truncated = self.simulator.periods >= self.horizon
         if invalid:
             terminated = ~self.simulator.valid
             self._charge_the_rest(terminated, snapshot, Price(*self._price.tolist()))
-            truncated &= ~terminated
-        info = self.info(snapshot, voltage)
-        return Outcome(snapshot.observation, snapshot.figure("reward"), terminated, truncated, info)
+        terminated = terminated[arm]
+        truncated = (self.simulator.periods[arm] >= self.horizon) & ~terminated
+        reward = snapshot.figures[REWARD, arm]
+        return Outcome(snapshot.observation[arm], reward, terminated, truncated, self.info(snapshot, voltage, arm))
 
     def _charge_the_rest(self, terminated: NDArray[np.bool_], snapshot: Snapshot, price: Price) -> None:
         """Charges terminated arms the worst reward for the remaining time, this control period included."""
@@ -233,25 +232,26 @@ class Episodes:
         """
         price = self._price * (0.0, 0.0, 0.0, 1.0)
         snapshot = blank(self.num_envs, self._size)
-        observe.observe(*self.simulator.raw, *self._asked, price, *snapshot, 0, self.num_envs)
+        self.simulator.observe((*self._asked, price, *snapshot))
         self.sensing.complete(snapshot.observation, resting)
         return snapshot
 
-    def info(self, snapshot: Snapshot, command: Array | None = None) -> dict[str, Any]:
-        """Metrics of a control period and draws in new arrays, one row per arm; after a reset without a command."""
-        info: dict[str, Any] = dict(zip(INFO_FIGURES, snapshot.figures, strict=False))
+    def info(self, snapshot: Snapshot, command: Array | None = None, arm: int | slice = ALL) -> dict[str, Any]:
+        """Metrics of a control period and draws, of all arms or of one; after a reset without a command.
+
+        New arrays with one row per arm, or the numbers and arrays of one arm.
+        """
         if command is None:
             command = np.zeros((self.num_envs, self.arm.n_joints))
-        info["voltage"] = command.copy() if self.sensing.silent else self.sensing.terminal_voltage(command)
-        info["voltage_command"] = command
-        summary = self.simulator.raw[1].copy()
-        info["elbow_force"], info["constraint_residual"] = summary[:, SUMMARY_COLUMNS:], summary[:, RESIDUAL]
+        summary = self.simulator.raw[1][arm].copy()
+        info: dict[str, Any] = dict(zip(INFO_FIGURES, snapshot.figures[:, arm], strict=False))
+        info["voltage"] = self.sensing.terminal_voltage(command)[arm]
+        info["voltage_command"] = command[arm]
+        info["elbow_force"], info["constraint_residual"] = summary[..., SUMMARY_COLUMNS:], summary.T[RESIDUAL]
         if not self.sensing.silent:
-            info.update(self.sensing.info())
-        if self._arms_differ:
-            info["parameters"] = self.population.copy()
-        if self._circles_differ:
-            info["circle"] = self.targets.figures()
+            rows = self.sensing.info()
+            info.update(rows if isinstance(arm, slice) else of_arm(rows, arm))
+        self._draws.tell(info, arm)
         return info
 
     def _own(self) -> dict[str, NDArray[Any]]:
@@ -296,4 +296,4 @@ class Episodes:
         self.simulator.set_parameters(chosen, rows)
         self.actuation.take_values()
         self.sensing.set_noise(chosen, generators)
-        self._arms_differ = self._differing()
+        self._draws.renew()

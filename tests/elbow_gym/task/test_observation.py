@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from elbow_gym import Circle, Simulator, paper_arm
-from elbow_gym.kernel.observe import observe
+from elbow_gym.kernel.build import kernel
 from elbow_gym.kernel.rows import AHEAD, PAID, PHASE, TASK_COLUMNS, TURN
+from elbow_gym.kernel.slots import BLOCK_LANES
 from elbow_gym.kinematics import hand_position
 from elbow_gym.task import observation as task
 from elbow_gym.task.reward import Price
@@ -60,7 +61,9 @@ def look(simulator, price=FREE, spent=0.0, paid=None):
     sight, path = blank(3, LAYOUT.size), np.repeat(CIRCLE.path[None], 3, axis=0)
     layout = (POSE, LAYOUT.starts, np.stack([LAYOUT.scale, LAYOUT.high]))
     clock = np.full((3, 2), 2)
-    observe(*simulator.raw[:2], clock, asked, path, *layout, np.array(price), *sight, 0, 3)
+    own = (*simulator.raw[:2], clock, asked, path, *layout, np.array(price), *sight)
+    kernel(BLOCK_LANES).observe(*own, first=0, end=3)
+    assert (clock == 2).all()
     if paid is not None:
         paid[:] = asked[:, PAID]
     return sight
