@@ -30,7 +30,8 @@ coupling, and in relative angles the mass matrix is nowhere less than the rotors
 
 A state to start from counts with its temperatures, and with its speeds and currents beyond what a run comes to: links
 that whip turn OVERSHOOT times as fast as a free motor, and a reversal at full speed draws 2 V0 / R.
-Multiples are where the energy balance of motors under voltages that jump between +V0 and -V0 is right to 1e-3.
+Multiples are where the energy balance of motors under voltages that jump between +V0 and -V0 is right to 1e-3, and to
+3e-3 with "rk4", whose steps are shorter unless one is given.
 """
 
 from __future__ import annotations

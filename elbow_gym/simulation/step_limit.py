@@ -15,6 +15,8 @@ MOST_SUBSTEPS = 2000
 """Substeps of a control period at most."""
 GROWTH = (0.6 / SMOOTH, 1.2 / SMOOTH, 1.8 / SMOOTH)
 """First substeps after the voltage's jump, as shares of the longest that the smooth rates allow."""
+CLASSICAL = 0.75
+"""Substeps of "rk4", all of them alike after the voltage's jump, as a share of the longest that smooth rates allow."""
 FEW = (0.3 / SMOOTH, 0.9 / SMOOTH)
 """Longest control periods that one step and two cover, as such shares."""
 # What rounding may add to a step or a count of steps.
@@ -47,7 +49,7 @@ def schedule(period: float, found: Mapping[str, float], integrator: str) -> Arra
     """Substeps of a control period [s], in order; they add up to the period.
 
     Exponential ones grow, from a short one after the voltage's jump to the longest that resolves every rate, in at most
-    four sizes; those of "rk4" are equal.
+    four sizes; those of "rk4" are equal, and shorter where motion is free.
 
     Args:
         period: control period [s].
@@ -56,10 +58,11 @@ def schedule(period: float, found: Mapping[str, float], integrator: str) -> Arra
 
     Raises ValueError naming the fastest rate when there would be more than `MOST_SUBSTEPS`.
     """
-    steps = _steps(found, integrator)
-    longest, name = limits(found, integrator)
-    smooth = min(step for name, step in steps.items() if MECHANISMS[name].smooth)
-    growing = integrator == "exponential"
+    growing, steps = integrator == "exponential", _steps(found, integrator)
+    if not growing:
+        steps |= {name: CLASSICAL * step for name, step in steps.items() if MECHANISMS[name].smooth}
+    name = min(steps, key=steps.__getitem__)
+    longest, smooth = steps[name], min(step for name, step in steps.items() if MECHANISMS[name].smooth)
     first = np.minimum(np.array(GROWTH if growing else ()) * smooth, longest)
     fewest = 1 + sum(growing and period > share * smooth for share in FEW)
     first = first[: max(fewest, np.searchsorted(np.cumsum(first), period * (1.0 - HAIR)) + 1)]
