@@ -1,7 +1,8 @@
-"""All switches at once: a million steps stay finite, and lanes, batch sizes and threads change no bit."""
+"""All switches at once, and all ids: millions of steps stay finite, and lanes, batches and threads change no bit."""
 
 from dataclasses import replace
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -129,3 +130,66 @@ def test_elbows_that_for_an_instant_can_hardly_move_against_each_other_end_no_ep
         assert (reward, terminated) == (together[1][1], False)
     # Steps of 0.05 ms come to 20,717 J.
     assert info["electrical_energy"] == pytest.approx(20_717.0, rel=0.02)
+
+
+EVERY_SWITCH = {
+    "elbow_friction": 0.1, "table": {"friction": 0.3}, "heat": True, "supply_resistance": 0.1, "regeneration": False,
+    "gear_coulomb_friction": 0.005, "payload": 0.2,
+}  # fmt: skip
+ENDURED = {
+    "two elbows": ("ElbowArm-v0", {}),
+    "one elbow": ("ElbowArm-v0", {"elbows": 1}),
+    "no elbow": ("ElbowArm-v0", {"elbows": 0}),
+    "table": ("ElbowArmTable-v0", {}),
+    "random arms and circles": ("ElbowArmRandom-v0", {}),
+    "several objectives": ("mo-ElbowArm-v0", {}),
+    "rubbing elbows": ("ElbowArm-v0", {"elbow_friction": 0.1}),
+    "heat, supply and rough gears": (
+        "ElbowArm-v0", {name: EVERY_SWITCH[name] for name in ("heat", "supply_resistance", "gear_coulomb_friction")}
+    ),
+    "every switch": ("ElbowArm-v0", EVERY_SWITCH),
+    "every switch by the classical method": ("ElbowArm-v0", {**EVERY_SWITCH, "integrator": "rk4"}),
+}  # fmt: skip
+"""Ids and arguments of a million steps each."""
+
+
+def endured(name, rounds):
+    """Figures of `rounds` times 64,000 control periods: uniform, bang-bang and seldom changing voltages in turns.
+
+    That is control periods, episodes that ended early or whose infos said that they are not to be trusted, the worst
+    energy balance of the others, and whether every number was finite.
+    """
+    identity, arguments = ENDURED[name]
+    env = gym.make_vec(identity, num_envs=256, autoreset_mode="Disabled", **arguments)
+    sim, rng = env.unwrapped.episodes.simulator, np.random.default_rng(11)
+    periods, ended, told, worst, finite = 0, 0, 0, 0.0, True
+    for k in range(rounds):
+        env.reset(seed=1000 * k)
+        before, held = sim.stored_energy, rng.choice([-1.0, 1.0], (256, 10))
+        over, astray = np.zeros(256, dtype=bool), np.zeros(256, dtype=bool)
+        for _ in range(env.unwrapped.settings.horizon):
+            held = np.where(rng.random((256, 10)) < (0.5, 0.05)[k % 2], -held, held)
+            action = rng.uniform(-1.0, 1.0, (256, 10)) if k % 3 == 2 else held
+            observation, reward, terminated, _, info = env.step(action.astype(np.float32))
+            finite &= bool(np.isfinite(observation).all() and np.isfinite(reward).all())
+            over |= terminated
+            astray |= info["constraint_residual"] > 1e-6
+            periods += 256
+            if terminated.any():
+                env.reset(options={"reset_mask": terminated})
+        finite &= bool(np.isfinite(sim.get_state()["state"]).all())
+        lost = sim.copper_loss.sum(1) + sim.friction_loss.sum(1) + sim.contact_loss.sum(1)
+        missing = np.abs(info["electrical_energy"] - lost - sim.stored_energy + before)
+        ended, told = ended + over.sum(), told + (astray & ~over).sum()
+        worst = max(worst, (missing / (info["drawn_energy"] + lost))[~(over | astray)].max())
+    return {"periods": periods, "ended": int(ended), "told": int(told), "worst": float(worst), "finite": finite}
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", ENDURED)
+def test_a_million_control_periods_of_every_id_and_switch_stay_finite_and_balanced(name):
+    found = endured(name, 16)
+    assert found["periods"] > 1_000_000
+    assert found["finite"]
+    assert found["worst"] < 1e-3
+    assert found["ended"] + found["told"] < 40
