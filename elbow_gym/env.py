@@ -89,8 +89,9 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     ## Episode End
 
-    Truncated after `duration` seconds. Terminated only when the state leaves what float64 can represent; the
-    remaining time is then charged at the worst rate that the spaces' bounds allow.
+    Truncated after `duration` seconds. Terminated only when the state leaves what float64 can represent, or when no
+    finer steps keep account of the energy that a reset's state brought; the remaining time is then charged at the
+    worst rate that the spaces' bounds allow.
 
     ## Arguments
 

@@ -27,17 +27,14 @@ from elbow_gym.parameters import ArmParameters, Array, as_arm, as_elbows
 from elbow_gym.simulation.options import Conditions, as_conditions
 from elbow_gym.simulation.parameter_rows import parameter_table
 from elbow_gym.simulation.rates import rates
+from elbow_gym.simulation.retaking import Retaking
 from elbow_gym.simulation.state_checks import PLANE_TOLERANCE, check_angles, check_on_table, checked_arrays
-from elbow_gym.simulation.state_views import Readings
 from elbow_gym.simulation.step_limit import INTEGRATORS, check_timestep
 from elbow_gym.simulation.thread_pool import Sharing
 from elbow_gym.simulation.writable import take_over
 
-# Parts that a step is divided into where whole steps lead to a state that cannot be represented.
-FINER = (8, 64)
 
-
-class Simulator(Readings):
+class Simulator(Retaking):
     """B arms side by side under piecewise constant voltages, with the energies integrated alongside.
 
     Args:
@@ -93,6 +90,7 @@ class Simulator(Readings):
         self._clock = np.zeros((self.num_envs, 2), dtype=np.int64)
         self.period = 0.0
         """Length of a control period [s], by which `control_step` moves the clock."""
+        self._motion = np.zeros(self.num_envs)
         self._attach()
         self._nominal = as_batch("nominal_pose", self.arm.nominal_pose, (self.num_envs, n))
         check_angles("nominal_pose", self._nominal)
@@ -145,6 +143,7 @@ class Simulator(Readings):
         valid = self._summary[:, VALID].copy()
         self._summary[chosen] = 0.0
         self._clock[chosen] = 0
+        self._watch(chosen)
         self.advance(np.zeros((self.num_envs, self.arm.n_joints)), np.zeros(0))
         # A new summary of the other arms' last state does not make it the outcome of their last step.
         self._summary[~chosen, VALID] = valid[~chosen]
@@ -229,24 +228,12 @@ class Simulator(Readings):
         # One share checks its own actions before it moves; several must not move before all are checked.
         if self._num_threads > 1 and np.isnan(actions[0]).any():
             return -1
+        kept = self._kept(task[0]) if self._restless else None
         own = (self._state, self._parameters, self._elbow_index, steps, self._summary, self._clock)
         invalid = self._sharing.total(self._kernel.control_step, *actions, *own, *task)
-        return self._taken_again(actions[1], steps, task) if invalid > 0 else invalid
-
-    def _taken_again(self, voltage: Array, steps: Array, task: tuple[NDArray[Any], ...]) -> int:
-        """Takes arms that steps made unrepresentable, and which are where they were, through finer ones.
-
-        Elbows that for an instant can hardly move against each other need them. Returns the number of arms that are
-        not `valid` after that.
-        """
-        for share in FINER:
-            finer = np.repeat(steps / share, share)
-            for arm in np.flatnonzero(~self.valid):
-                one = (int(arm), int(arm) + 1)
-                moved = (self._state, self._parameters, voltage, self._elbow_index, finer, self._summary)
-                if not self._kernel.advance(*moved, *one):
-                    self._kernel.observe(*self.raw, *task, first=one[0], end=one[1])
-        return int((~self.valid).sum())
+        if invalid < 0 or (invalid == 0 and kept is None):
+            return invalid
+        return self._taken_again(actions[1], steps, task, kept)
 
     def observe(self, task: tuple[NDArray[Any], ...]) -> None:
         """Observations and figures of every arm as it is; `task` is that of `control_step`."""
@@ -266,7 +253,7 @@ class Simulator(Readings):
         return {name: array.copy() for name, array in self._own().items()}
 
     def _own(self) -> dict[str, NDArray[Any]]:
-        return {"state": self._state, "summary": self._summary, "clock": self._clock}
+        return {"state": self._state, "summary": self._summary, "clock": self._clock, "motion": self._motion}
 
     def set_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Restores a state of an equal simulator. Raises ValueError as `checked_arrays`, with nothing changed."""
@@ -280,6 +267,7 @@ class Simulator(Readings):
         """Gives the chosen arms, (k,), states that `checked` has passed, of k arms or of one for all."""
         for name, array in self._own().items():
             array[chosen] = saved[name]
+        self._restless = bool(self._motion.any())
 
     @property
     def time(self) -> Array:

@@ -55,7 +55,7 @@ def checked_arrays(
     """Arrays of a simulator's saved state of k arms by name.
 
     Args:
-        own: the simulator's arrays `state`, `summary` and `clock`.
+        own: the simulator's arrays `state`, `summary`, `clock` and `motion`.
         state: the saved state.
         elbows: joint numbers.
         length: lengths of the arms' links [m], (k, n).
@@ -68,6 +68,8 @@ def checked_arrays(
     saved = {name: saved_rows(f"state[{name!r}]", given[name], array, len(length)) for name, array in own.items()}
     if saved["clock"].min() < 0:
         raise ValueError(f"state['clock'] must not be negative, got {saved['clock'].min()}")
+    if saved["motion"].min() < 0.0:
+        raise ValueError(f"state['motion'] must not be negative, got {saved['motion'].min():g} J")
     meters, valid = saved["state"][:, GROWING], saved["summary"][:, VALID]
     if meters.min() < 0.0:
         raise ValueError(f"state['state'] must have no negative losses, got {meters.min():g} J")
