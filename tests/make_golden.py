@@ -27,7 +27,8 @@ def trace(elbows):
     for voltage in voltages:
         sim.step(voltage, 10)
         moments.append(sim.get_state())
-    return {"voltage": voltages} | {name: np.stack([moment[name] for moment in moments]) for name in moments[0]}
+    kept = ("state", "summary", "clock")
+    return {"voltage": voltages} | {name: np.stack([moment[name] for moment in moments]) for name in kept}
 
 
 def picture():

@@ -34,8 +34,9 @@ class Account(NamedTuple):
     stored: Array
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def stored(state: Array, rows: Array) -> Stored:
-    """Energy in arms.
+    """Energy in arms; infinite, or not a number, where float64 cannot represent it.
 
     Args:
         state: the kernel's state rows, (B, rows, n).
@@ -63,6 +64,7 @@ def stored(state: Array, rows: Array) -> Stored:
     return Stored(motion, elastic / 2.0 + row["gravity"][:, 0] * raised)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def account(state: Array, rows: Array) -> Account:
     """What arms drew, lost and store; arguments are those of `stored`."""
     meter = {name: state[:, STATE.index(name)].sum(1) for name in STATE[3:]}

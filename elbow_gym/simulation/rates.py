@@ -56,7 +56,7 @@ PRESSING = 0.2
 HOUR = 3600.0
 # A joint's speed in a run over its motor's free speed, at most as a rule.
 OVERSHOOT = 3.0
-SMOOTH, CONTACT, ARMATURE, RINGING, GRAVITY, TURN, WHIRL = 2.2, 0.7, 1.4, 0.8, 0.5, 1.0, 2.0
+SMOOTH, CONTACT, ARMATURE, RINGING, GRAVITY, TURN, WHIRL = 2.2, 0.7, 1.4, 0.62, 0.5, 1.0, 2.0
 
 
 class Mechanism(NamedTuple):

@@ -2,7 +2,8 @@
 
 Steps are chosen for what motors make of an arm at rest. A state that a reset is given may hold many times the energy
 that a run comes to, and no closed form says how fast the links then whip. So the energy balance of such arms is checked
-after every control period, until they have lost that energy; one that keeps no balance in the finest steps ends.
+after every control period, until they have lost that energy, and always that of arms whose currents outlast a control
+period and go on to drive links beyond their motors' free speed. One that keeps no balance in the finest steps ends.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from elbow_gym.kernel.build import Kernel
-from elbow_gym.kernel.rows import PAID, VALID
+from elbow_gym.kernel.rows import PAID, PARAMETERS, VALID
 from elbow_gym.parameters import Array
 from elbow_gym.simulation.energy import Account, account, stored
 from elbow_gym.simulation.state_views import Readings
@@ -26,6 +27,10 @@ ROUNDING = 1e-12
 """What rounding may add to that, as a share of the energy stored [-]."""
 GONE = 10.0
 """Turnover, as a multiple of the energy of its motion at the start, after which an arm moves as its motors make it."""
+ALWAYS = 1e300
+"""Energy that is never gone [J]."""
+# Rows of the parameters whose product is the decay R / L of the currents.
+DECAY = PARAMETERS.index("armature_resistance"), PARAMETERS.index("inverse_inductance")
 
 
 class Kept(NamedTuple):
@@ -58,11 +63,13 @@ class Retaking(Readings):
         return account(self._state, self._parameters)
 
     def _watch(self, chosen: NDArray[np.bool_]) -> None:
-        """Has the balance checked of those chosen arms that move."""
+        """Has the balance checked of those chosen arms that move, or whose currents outlast a control period."""
+        motion = np.zeros(int(chosen.sum()))
         if self._state[chosen, 1:3].any():
-            self._motion[chosen] = stored(self._state, self._parameters).motion[chosen]
-        else:
-            self._motion[chosen] = 0.0
+            motion = np.nan_to_num(stored(self._state, self._parameters).motion[chosen])
+        resistance, inverse = (self._parameters[chosen, row] for row in DECAY)
+        lasting = (resistance * inverse).min(axis=1) * self.period < 1.0
+        self._motion[chosen] = np.where(lasting & (self.period > 0.0), ALWAYS, motion)
         self._restless = bool(self._motion.any())
 
     def _kept(self, task: Array) -> Kept:
@@ -73,8 +80,9 @@ class Retaking(Readings):
         if kept is None:
             return ~self.valid
         before, after = kept.account, self._account()
-        allowed = BALANCE * (after.turnover - before.turnover) + ROUNDING * before.stored
-        unbalanced = ~(np.abs(after.missing - before.missing) <= allowed)
+        with np.errstate(invalid="ignore"):
+            allowed = BALANCE * (after.turnover - before.turnover) + ROUNDING * before.stored
+            unbalanced = ~(np.abs(after.missing - before.missing) <= allowed)
         return ~self.valid | (unbalanced & (self._motion > 0.0))
 
     def _taken_again(

@@ -79,6 +79,8 @@ def wrong(outcomes):
 FOUND = {
     698: "elbows 3 and 5 rub while the links between them fold up and pass upright",
     1153: "the same with friction that alone stops the yaw",
+    10811: "currents outlast control periods and drive links far beyond their motors' free speed",
+    11226: "rotors ring against their inductances",
 }
 """Settings that were wrong, with what happens in them; each is right now."""
 

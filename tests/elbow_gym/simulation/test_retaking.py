@@ -1,9 +1,11 @@
 """Control periods taken again: arms that start with more energy than a run comes to keep account of every joule."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv
+from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, MotorParameters, paper_arm
 from elbow_gym.simulation import retaking
 
 RNG = np.random.default_rng(0)
@@ -79,3 +81,14 @@ def test_an_arm_that_no_steps_bring_through_stays_where_it_was_and_its_episode_e
             break
     assert terminated
     np.testing.assert_array_equal(sim.q, before)
+
+
+@pytest.mark.parametrize(("inductance", "always"), [(0.02, False), (0.03, True)])
+def test_balance_is_always_checked_where_currents_outlast_a_control_period(inductance, always):
+    arm = replace(paper_arm(), motors=(MotorParameters(armature_inductance=inductance),) * 10)
+    env = ElbowArmEnv(elbows=0, arm=arm)
+    env.reset(seed=0)
+    for action in ACTIONS[:3]:
+        env.step(action)
+    # R / L is 55 and 37 1/s, and a control period a fiftieth of a second.
+    assert (env.episodes.simulator.get_state()["motion"][0] > 0.0) == always
