@@ -45,6 +45,7 @@ class Kept(NamedTuple):
 class Retaking(Readings):
     """Part of the simulator that takes control periods again."""
 
+    period: float
     _kernel: Kernel
     _parameters: Array
     _elbow_index: NDArray[np.int64]
