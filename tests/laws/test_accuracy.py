@@ -70,7 +70,6 @@ CASES = {
 SAMPLE = (
     "policy, two elbows",
     "bang-bang, no elbow",
-    "policy on the table",
     "gentle on a table with friction",
     "uniform, rough",
 )

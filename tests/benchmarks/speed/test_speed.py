@@ -55,8 +55,13 @@ def no_peers(monkeypatch):
 )
 @pytest.mark.usefixtures("quick_starts", "small_batches", "no_batch_of_rk4", "no_peers")
 def test_quick_run_writes_all_own_rows_and_names_missing_peers(tmp_path, capsys, monkeypatch):
-    # Copies in processes of their own are slow to start, and Gymnasium's business.
-    without = [c for c in speed.contenders(quick=True) if "AsyncVectorEnv" not in c.name]
+    # Copies in processes of their own are slow to start, and Gymnasium's business. Two threads of a network spin while
+    # they wait for each other, here and in whatever later tests train.
+    without = [
+        c
+        for c in speed.contenders(quick=True)
+        if "AsyncVectorEnv" not in c.name and (c.family, c.threads) != (environments.SB3, 2)
+    ]
     monkeypatch.setattr(speed, "contenders", lambda quick: without)
     rows = speed.speed(tmp_path, quick=True, command="python -m benchmarks speed --quick")
     assert sorted(path.name for path in tmp_path.iterdir()) == [
