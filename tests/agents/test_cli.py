@@ -32,7 +32,7 @@ COMMANDS = {
         "report",
         "watch",
     ),
-    "benchmarks": ("energy", "learning", "optimal", "speed"),
+    "benchmarks": ("energy", "learning", "optimal", "planners", "speed"),
 }
 
 
