@@ -28,8 +28,8 @@ SMOOTHING, FAR_SMOOTHING, SHARE = 0.01, 0.05, 0.05
 distance from the target in between [-]. What is far off needs no sharper one, and the solver then fails less."""
 FIRST_SMOOTHING = 0.1
 """Length with which a first solve from an arm at rest starts [m]."""
-FIRST_ITERATIONS, ITERATIONS = 200, 20
-"""Most iterations in the first control period and in later ones."""
+FIRST_ITERATIONS, ITERATIONS = 60, 20
+"""Most iterations from rest and from the last plan."""
 # The next control period corrects what is left, and a tighter solve wanders in the flat valley of the postures.
 TOLERANCES = {
     "tol": 1e-3,
@@ -97,12 +97,12 @@ class RecedingHorizon(Planner):
         before = self._plans.get(arm)
         hand = hand_position(self.interface.arm, view.state["q"])
         near = float(np.clip(SHARE * np.linalg.norm(hand - view.target[0]), SMOOTHING, FAR_SMOOTHING))
-        if before is None:
-            plan = self._resting(view)
-            found = self._solved(plan, FIRST_SMOOTHING, max_iter=FIRST_ITERATIONS)
+        plan = self._resting(view) if before is None else Plan(*program.later(before.x, before.multipliers))
+        if plan.multipliers is None:
+            # The first solve, or one behind a failure: from rest, since a failed plan leads nowhere.
+            found = self._solved(self._resting(view), FIRST_SMOOTHING, max_iter=FIRST_ITERATIONS)
             found = found and self._solved(found, near, max_iter=FIRST_ITERATIONS, mu_init=WARM_BARRIER)
         else:
-            plan = Plan(*program.later(before.x, before.multipliers))
             found = self._solved(plan, near, max_iter=ITERATIONS, mu_init=WARM_BARRIER)
         if found is None:
             # Multipliers of what is no solution would lead the next solve astray, too.
