@@ -65,9 +65,7 @@ def remembered(context: Any) -> Generator[None]:
             return search(function, args, kws)
         found = _answers.get((function, args))
         if found is None:
-            found = search(function, args, kws)
-            if found is not None:
-                _answers[function, args] = found
+            found = _answers[function, args] = search(function, args, kws)
         return found
 
     context.resolve_function_type = resolve
