@@ -52,9 +52,12 @@ def test_plan_is_what_the_simulator_does():
     planner = RecedingHorizon(env, **SHORT)
     planner.predict(observation)
     parts, voltage = planner._program.split(planner._plans[0].x)
+    start = env.episodes.simulator.q[0].copy()
     for k in range(planner.periods):
         env.step(planner.interface.action(voltage[k]))
-        np.testing.assert_allclose(env.episodes.simulator.q[0], parts["q"][k, -1], rtol=0.0, atol=1e-3)
+        # Two Radau points resolve the first milliseconds after a voltage's jump to some hundredths of the motion.
+        moved = np.abs(parts["q"][k, -1] - start).max()
+        np.testing.assert_allclose(env.episodes.simulator.q[0], parts["q"][k, -1], rtol=0.0, atol=0.05 * moved)
 
 
 def test_where_the_solver_fails_the_shifted_plan_is_carried_out_and_counted(monkeypatch):
@@ -73,8 +76,11 @@ def test_where_the_solver_fails_the_shifted_plan_is_carried_out_and_counted(monk
     for k in (1, 2, 2):
         np.testing.assert_array_equal(planner.predict(observation)[0], planner.interface.action(planned[k]))
     assert planner.failures == 3
+    # Then it starts anew, from rest, as it did at first.
     monkeypatch.setattr(planner._program, "solve", solve)
-    planner.predict(observation)
+    np.testing.assert_array_equal(
+        planner.predict(observation)[0], RecedingHorizon(env, **SHORT).predict(observation)[0]
+    )
     assert planner.failures == 3
 
 
