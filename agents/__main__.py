@@ -178,15 +178,10 @@ def verify(receipt: str | None = None, trust: bool = False) -> None:
         receipt: Line of `python -m agents evaluate --receipt`, or a file that holds it; all checks when None.
         trust: Whether to read a .zip, whose pickles can run any code when they are read.
     """
-    if receipt is None:
-        from agents.verification import verify as verify_checkout
+    from agents.verification import verify as verify_all
 
-        if not verify_checkout():
-            raise SystemExit(1)
-        return
-    from agents.evaluation.command import verify_receipt
-
-    verify_receipt(receipt, trust)
+    if not verify_all(receipt, trust):
+        raise SystemExit(1)
 
 
 @app.command
@@ -292,19 +287,9 @@ def watch(
     from agents.watch.watch import watch as watch_controllers
 
     names = [controller] if versus is None else [controller, versus]
-    written = watch_controllers(
-        names,
-        env=task.env,
-        elbows=task.elbows,
-        arguments=task.arguments(),
-        trust=trust,
-        start=start,
-        seed=seed,
-        speed=speed,
-        size=size,
-        output=output,
-        tell=task.tell,
-    )
+    players = {"env": task.env, "elbows": task.elbows, "arguments": task.arguments(), "trust": trust, "tell": task.tell}
+    shown = {"start": start, "seed": seed, "speed": speed, "size": size}
+    written = watch_controllers(names, output=output, **players, **shown)
     if written is not None:
         print(written)
 

@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
+from agents.evaluation.command import verify_receipt
 from agents.evaluation.players import ELBOW_COUNTS
 from agents.evaluation.receipt import player_again, read_receipt
-from agents.evaluation.receipt import verify as verify_receipt
+from agents.evaluation.receipt import verify as play_again
 from agents.shipped import CURVES, POLICIES, RECEIPTS
 from agents.shipped.seeds import check_name
 from elbow_gym import verification
@@ -45,7 +46,7 @@ def shipped_policies(folders: Sequence[Path] = (BASELINES, POLICIES), curves: Pa
 def joules_again(receipt: Path) -> str:
     """The episodes of a receipt, played again. Raises ValueError where they cost other joules, or it cannot be read."""
     given = read_receipt(str(receipt))
-    return verify_receipt(given, player_again(given))
+    return play_again(given, player_again(given))
 
 
 CHECKS: dict[str, Callable[[], str]] = {
@@ -56,6 +57,17 @@ CHECKS: dict[str, Callable[[], str]] = {
 """Checks by name; each returns figures, or raises where something is wrong."""
 
 
-def verify() -> bool:
-    """Runs all checks and prints a line each; whether all have passed."""
-    return verification.verify(CHECKS)
+def verify(receipt: str | None = None, trust: bool = False) -> bool:
+    """Runs all checks and prints a line each; whether all have passed. With a receipt, plays that alone again.
+
+    Args:
+        receipt: its line or file, as `read_receipt` takes it.
+        trust: whether a file that may run code when it is read may be read.
+
+    Raises:
+        ValueError: the receipt cannot be read or played, or its results differ.
+    """
+    if receipt is None:
+        return verification.verify(CHECKS)
+    verify_receipt(receipt, trust)
+    return True
