@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -45,6 +46,7 @@ class Simulator(Retaking):
         timestep: length of the steps that `step` takes [s]; refused where it is too long for the arm's fastest rate.
         integrator: "exponential": Runge-Kutta of order 4 with exact decay of the currents; "rk4": the classical method.
         num_threads: threads over which blocks of arms are spread; the results do not depend on it.
+        duration: longest time between two resets [s], for which a step must resolve windings that warm up.
 
     Raises ValueError naming the argument.
     """
@@ -59,6 +61,7 @@ class Simulator(Retaking):
         timestep: float = 0.002,
         integrator: str = "exponential",
         num_threads: int = 1,
+        duration: float = math.inf,
     ) -> None:
         self.arm = as_arm(arm)
         self.elbows = as_elbows(elbows, self.arm.n_joints)
@@ -71,7 +74,7 @@ class Simulator(Retaking):
         if integrator not in INTEGRATORS:
             raise ValueError(f"integrator must be one of {INTEGRATORS}, got {integrator!r}")
         row = parameter_table(self.arm, self.conditions)
-        found = rates(row, self.conditions, elbows=bool(self.elbows))
+        found = rates(row, self.conditions, elbows=bool(self.elbows), duration=duration)
         check_timestep(self.timestep, self.timestep, found, integrator)
         self._switches = {
             "table": self.conditions.surface is not None,

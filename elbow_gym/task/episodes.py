@@ -66,6 +66,7 @@ class Episodes:
             timestep=float(settings.substeps.min()),
             integrator=settings.integrator,
             num_threads=num_threads,
+            duration=settings.duration,
         )
         self.simulator.period = settings.control_period
         self.num_envs = num_envs

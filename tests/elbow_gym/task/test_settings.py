@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from elbow_gym import Circle, paper_arm
+from elbow_gym.task.episodes import Episodes
 from elbow_gym.task.settings import Settings
 
 POSITIVE = ("control_frequency", "timestep", "duration", "voltage_limit")
@@ -131,6 +132,7 @@ def test_default_steps_grow_after_the_voltages_jump_to_the_longest_that_the_fast
     # Five seconds warm a winding by 106 K at most, 1.42 times its resistance; in the end it would be 3.7 times.
     warm = [Settings(integrator="rk4", heat=True, duration=duration).substeps.size for duration in (5.0, 5e3)]
     assert [Settings(integrator="rk4").substeps.size, *warm] == [13, 18, 47]
+    assert Episodes(Settings(integrator="rk4", heat=True)).simulator.timestep == pytest.approx(0.02 / 18)
     assert settings.substeps == pytest.approx([0.0015, 0.003, 0.0045, 0.0055, 0.0055], rel=1e-3)
     assert settings.substeps.sum() == pytest.approx(0.02, rel=1e-15)
     sagging = Settings(supply_resistance=0.3)
