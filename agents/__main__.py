@@ -128,6 +128,7 @@ def bound(
     environment: JsonObject = NOTHING,
     under_table: bool | None = None,
     fresh: bool = False,
+    starts: Count = 2,
     output: Path | None = None,
 ) -> None:
     """Finds the best known solution of any task without contact, with its certificate; solved tasks are kept.
@@ -142,17 +143,20 @@ def bound(
         environment: Other arguments of the environment, such as "arm", "duration" or "voltage_limit".
         under_table: Whether joints may go below z = 0; only with two or more elbows, where they hardly do, when None.
         fresh: Whether it is solved again, and from postures; the better solution is kept.
+        starts: Number of postures that a task from scratch is started from; the cheapest descent is followed.
         output: File for the trajectory, .npz.
     """
     from agents.optimal.command import settings_of, solve_and_print
 
     more = {"circle": circle, "payload": payload, "start": start, **environment}
     above_table = None if under_table is None else not under_table
-    solve_and_print(settings_of(elbows, weights, pose, more), above_table, fresh, output)
+    solve_and_print(settings_of(elbows, weights, pose, more), above_table, fresh, output, starts)
 
 
 @app.command
-def bounds(tasks: Positional[Path], output: Path, under_table: bool | None = None, workers: int | None = None) -> None:
+def bounds(
+    tasks: Positional[Path], output: Positional[Path], under_table: bool | None = None, workers: int | None = None
+) -> None:
     """Finds the bounds of many tasks in processes and writes a CSV; run it again to go on after an interruption.
 
     Args:

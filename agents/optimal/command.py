@@ -15,8 +15,8 @@ from agents.optimal.search import bound
 from elbow_gym.parameters import as_arm
 from elbow_gym.task.settings import Settings
 
-SOLVES = 8
-"""Lines of progress that a task takes from scratch, for the bar."""
+SOLVES = 6
+"""Lines of progress of a task from scratch beside one for each start, for the bar."""
 
 
 def settings_of(
@@ -37,17 +37,27 @@ def settings_of(
     return Settings(**chosen)
 
 
-def solve_and_print(settings: Settings, above_table: bool | None, fresh: bool, output: Path | None) -> None:
-    """Finds a bound with a bar on stderr and prints it; `output` is the file for its trajectory, .npz."""
+def solve_and_print(
+    settings: Settings, above_table: bool | None, fresh: bool, output: Path | None, starts: int = 2
+) -> None:
+    """Finds a bound with a bar on stderr and prints it.
+
+    Args:
+        settings: the task.
+        above_table: as in `bound`.
+        fresh: as in `bound`.
+        output: file for its trajectory, .npz; none when None.
+        starts: as in `bound`.
+    """
     from tqdm import tqdm
 
-    with tqdm(total=SOLVES, unit="solve", file=sys.stderr) as bar:
+    with tqdm(total=SOLVES + starts, unit="solve", file=sys.stderr) as bar:
 
         def advance(line: str) -> None:
             bar.set_description(line[:60])
             bar.update()
 
-        found = bound(settings, above_table=above_table, fresh=fresh, parallel=True, progress=advance)
+        found = bound(settings, above_table=above_table, fresh=fresh, starts=starts, parallel=True, progress=advance)
         bar.total = bar.n
     for line in lines(found):
         print(line)

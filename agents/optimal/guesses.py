@@ -15,41 +15,74 @@ from agents.control.posture import best_postures
 from agents.control.trajectory import Trajectory
 from agents.evaluation.recording import Recording, record
 from agents.optimal.problem import Problem
-from elbow_gym.kinematics import inverse_kinematics
+from elbow_gym.kinematics import inverse_kinematics, on_table
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
 Array = NDArray[np.float64]
 
+SEARCHES = 12
+"""Least number of searches for postures of least copper loss."""
+ALIKE = 0.2
+"""Largest difference of an angle up to which two postures are one [rad]."""
+NOISE = 0.5
+"""Standard deviation of a random posture's idle joints [rad]."""
+TRIES = 20
+"""Random poses that are tried for each guess, at most."""
 REACH_TIME = 1.0
 """Time of a guess from the start to its posture [s]."""
 
 
-def posture_guesses(problem: Problem) -> dict[str, Trajectory]:
-    """Smooth motions from the start to the paper's posture and to the best posture at rest, by name."""
+def posture_guesses(problem: Problem, count: int = 2) -> dict[str, Trajectory]:
+    """Smooth motions from the start to postures, by name.
+
+    They are the paper's posture, those of least copper loss at rest, the best first, and then the paper's with normal
+    noise on its idle joints, always the same. Postures from which the last two links do not cover the path are left
+    out, so that there may be fewer than `count`.
+    """
     settings = problem.settings
     arm, circle, elbows = settings.parsed_arm, settings.parsed_circle, settings.elbow_joints
-    poses = {"paper posture": np.array(arm.nominal_pose)}
+    nominal = np.array(arm.nominal_pose)
+    poses = {"paper posture": nominal}
     try:
-        best = best_postures(arm, elbows, circle, problem.above_table, payload=settings.payload)[0]
-        poses[f"posture of {best.copper_loss:.1f} W"] = best.pose
+        found = best_postures(
+            arm, elbows, circle, problem.above_table, starts=max(SEARCHES, count), payload=settings.payload
+        )
     except ValueError:
         # Where no posture serves the whole path at rest, one in motion may.
-        pass
+        found = []
+    for posture in found:
+        apart = min(float(np.abs(posture.pose - pose).max()) for pose in poses.values())
+        if len(poses) < count and (apart > ALIKE or len(poses) == 1):
+            poses[f"posture of {posture.copper_loss:.1f} W"] = posture.pose
+    guesses = {name: guess for name, pose in poses.items() if (guess := _motion(problem, pose)) is not None}
+    rng = np.random.default_rng(0)
+    for k in range(TRIES * count):
+        if len(guesses) >= count or count <= 2:
+            break
+        noise = np.concatenate([[0.0], rng.normal(scale=NOISE, size=arm.n_joints - 3), [0.0, 0.0]])
+        try:
+            guess = _motion(problem, on_table(arm, nominal + noise, elbows))
+        except ValueError:
+            continue
+        if guess is not None:
+            guesses[f"random posture {k + 1}"] = guess
+    return guesses
+
+
+def _motion(problem: Problem, pose: Array) -> Trajectory | None:
+    """The smooth motion to a posture [rad], (n,), without voltages; None where the path is out of its reach."""
+    settings, circle = problem.settings, problem.settings.parsed_circle
     instants = settings.control_period * np.arange(settings.horizon + 1)
     angle = circle.angle(instants, float(circle.phase))
     grown, rate, _ = minimum_jerk(instants / REACH_TIME)
-    guesses = {}
-    for name, pose in poses.items():
-        try:
-            q_d, q_d_dot = inverse_kinematics(arm, pose, circle.position(angle), circle.velocity(angle))
-        except ValueError:
-            # The last two links do not cover the path from this posture; another one may.
-            continue
-        q = problem.start + grown[:, None] * (q_d - problem.start)
-        q_dot = rate[:, None] / REACH_TIME * (q_d - problem.start) + grown[:, None] * q_d_dot
-        guesses[name] = Trajectory(q, q_dot, np.zeros_like(q), np.zeros_like(q[1:]))
-    return guesses
+    try:
+        q_d, q_d_dot = inverse_kinematics(settings.parsed_arm, pose, circle.position(angle), circle.velocity(angle))
+    except ValueError:
+        return None
+    q = problem.start + grown[:, None] * (q_d - problem.start)
+    q_dot = rate[:, None] / REACH_TIME * (q_d - problem.start) + grown[:, None] * q_d_dot
+    return Trajectory(q, q_dot, np.zeros_like(q), np.zeros_like(q[1:]))
 
 
 def simulated(problem: Problem, trajectory: Trajectory) -> tuple[Trajectory, Recording]:

@@ -193,6 +193,7 @@ def bound(
     *,
     above_table: bool | None = None,
     fresh: bool = False,
+    starts: int = 2,
     parallel: bool = False,
     progress: Progress = lambda _: None,
     store: Store | None = None,
@@ -207,6 +208,7 @@ def bound(
         settings: arguments of the environment, without contact, friction, heat, supply resistance and randomisation.
         above_table: whether joints 3..n and the hand must have z >= 0; where there are fewer than two elbows if None.
         fresh: whether it is solved again, and from the postures; the cheaper solution stays in the store.
+        starts: number of postures that a task from scratch is started from; the cheapest descent is followed.
         parallel: whether the postures are followed in processes of their own; a script then needs its
             `if __name__ == "__main__":`.
         progress: called with a line on every solve.
@@ -236,7 +238,7 @@ def bound(
             except ArithmeticError as error:
                 progress(f"{NEIGHBOUR}: {error}")
     if found is None:
-        found = certified(problem, {**posture_guesses(problem), **guesses}, progress, parallel=parallel)
+        found = certified(problem, {**posture_guesses(problem, starts), **guesses}, progress, parallel=parallel)
     answer, coarse = found
     if known is not None and known.cost <= answer.cost:
         return known

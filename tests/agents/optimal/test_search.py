@@ -93,6 +93,18 @@ def test_a_descent_lifts_joints_above_the_table_and_keeps_to_a_weak_supply():
     assert np.abs(above.trajectory.voltage).max() == 15.0
 
 
+@pytest.mark.slow
+def test_more_starts_are_different_motions_from_the_same_start():
+    problem = Problem(Settings(elbows=1, duration=0.1), above_table=True)
+    guesses = posture_guesses(problem, 6)
+    assert len(guesses) == 6
+    assert list(posture_guesses(problem, 2)) == list(guesses)[:2]
+    ends = np.array([guess.q[-1] for guess in guesses.values()])
+    apart = np.abs(ends[:, None] - ends).max(axis=-1)[~np.eye(6, dtype=bool)]
+    assert apart.min() > 1e-3
+    np.testing.assert_allclose([guess.q[0] for guess in guesses.values()], np.tile(problem.start, (6, 1)))
+
+
 def test_shipped_optima_are_solved_tasks_to_start_from(tmp_path):
     near = Store(tmp_path).nearest(Problem(Settings(payload=0.15)))
     assert (near.name, near.point) == ("elbows2", None)
@@ -124,7 +136,7 @@ def test_many_tasks_are_solved_or_their_failures_named_and_the_store_is_asked_fi
 )
 def test_a_check_that_fails_is_named_and_nothing_is_stored(solved, tmp_path, monkeypatch, name, said):
     # Of the solution that there is; to find it again for each check takes seconds.
-    monkeypatch.setattr(search, "posture_guesses", lambda _: {})
+    monkeypatch.setattr(search, "posture_guesses", lambda *_: {})
     monkeypatch.setattr(search, "certified", lambda *_, **__: (certificate.checked(*solved[-1]), None))
     monkeypatch.setattr(certificate, name, 0.0)
     with pytest.raises(SolveError, match=said):
