@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal
@@ -38,19 +37,10 @@ def reproduce(
         table: Whether to play on a compliant table instead, which cannot pull, from start poses under three
             frictions, with a verdict on whether leaning saves energy.
     """
+    from agents.paper.command import reproduce as reproduce_cases
     from agents.paper.subject import Subject
 
-    subject = Subject(2 if elbows is None else elbows, arm)
-    if arm is not None:
-        print(subject.described(), file=sys.stderr)
-    if table:
-        from agents.paper.table_claims import reproduce_on_table
-
-        reproduce_on_table(output, publish=publish, subject=subject)
-        return
-    from agents.paper.cases import reproduce as reproduce_paper
-
-    reproduce_paper(output, publish=publish, subject=subject)
+    reproduce_cases(Subject(2 if elbows is None else elbows, arm), output, publish, table)
 
 
 @app.command_from
