@@ -158,16 +158,21 @@ def play(task: Task, player: Player) -> dict[str, float]:
     return dict(zip(FIGURES, map(float, figures), strict=True))
 
 
-def _played(task: Task, name: str, folder: Path, tell: Tell) -> dict[str, float]:
-    """Figures of an episode, from the folder where the same was played before."""
+def _played(task: Task, name: str, folder: Path, tell: Tell) -> dict[str, float] | None:
+    """Figures of an episode, from the folder where the same was played before; None where the controller refuses it."""
     player = find_player(name, task.elbows)
     question = {"player": player.identity, "settings": plain_arguments(player.settings), "task": task.arguments}
     key = cache.key(json.loads(json.dumps(question)))
     stored = cache.load(key, folder)
-    if stored is None:
-        stored = {NOMINAL: {figure: np.array([value]) for figure, value in play(task, player).items()}}
-        cache.store(key, stored, folder)
     tell(1)
+    if stored is None:
+        try:
+            figures = play(task, player)
+        except ValueError:
+            # Computed torque moves its hand with the last two links alone, which do not cover every circle.
+            return None
+        stored = {NOMINAL: {figure: np.array([value]) for figure, value in figures.items()}}
+        cache.store(key, stored, folder)
     return {figure: float(values[0]) for figure, values in stored[NOMINAL].items()}
 
 
@@ -208,10 +213,11 @@ def planners(
             task.name,
             task.elbows,
             name,
-            *(f"{played[task, name][figure]:.6g}" for figure in FIGURES),
+            *(f"{figures[figure]:.6g}" for figure in FIGURES),
             "" if known[task] is None else f"{-known[task]:.6g}",
         ]
-        for task, name in jobs
+        for (task, name), figures in played.items()
+        if figures is not None
     ]
     write_csv(output / "planners.csv", HEADER, rows)
     text = table(rows)

@@ -66,14 +66,23 @@ def test_planners_table_is_made_of_its_rows_and_episodes_are_played_once(tmp_pat
     monkeypatch.setattr(module, "PLAYERS", ("ppo",))
     monkeypatch.setattr(module, "ELBOW_COUNTS", (2,))
     monkeypatch.setattr(module, "in_processes", lambda jobs, tell: {key: job.work(tell) for key, job in jobs.items()})
-    monkeypatch.setattr(module, "play", lambda task, player: counted.append(task.name) or dict.fromkeys(FIGURES, 1.5))
+
+    def played(task, player):
+        counted.append(task.name)
+        if task.name == "1":
+            raise ValueError("position must be within reach")
+        return dict.fromkeys(FIGURES, 1.5)
+
+    monkeypatch.setattr(module, "play", played)
     for _ in range(2):
         text = planners(tmp_path / "out", 2, 2, folder=tmp_path / "cache")
-    assert counted == [NOMINAL, "0", "1"]
+    assert counted == [NOMINAL, "0", "1", "1"]
     assert (tmp_path / "out" / "planners.md").read_text() == text
     rows = (tmp_path / "out" / "planners.csv").read_text().splitlines()
     assert rows[0].split(",") == list(HEADER)
     assert rows[1].startswith("nominal,2,ppo,1.5,1.5,1.5,1.5,1.5,-30")
+    # A controller that refuses a task has no row there.
+    assert [row.split(",")[0] for row in rows[1:]] == [NOMINAL, "0"]
 
 
 def test_table_has_nominal_rows_and_means_of_the_drawn_ones():
