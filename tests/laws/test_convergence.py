@@ -34,7 +34,7 @@ def test_both_integrators_converge_to_the_same_run(elbows):
 
 
 # The longest step is one that only the exact decay of the currents allows.
-EXACT_DECAY = [(2e-3, 2e-5, 1e-3)]
+EXACT_DECAY = [(0.02 / 12, 2e-5, 1e-3)]
 BOTH = [(1e-3, 2e-7, 5e-5), (1e-4, 1e-11, 1e-8)]
 
 
