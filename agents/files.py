@@ -139,13 +139,25 @@ def read_json(path: Path) -> dict[str, Any]:
         OSError: the file cannot be opened.
         ValueError: the file is cut or altered, with its name.
     """
-    try:
-        plain = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"{path} must hold JSON as it was written, got a damaged file: {error}") from error
+    plain = _parsed(path)
     if not isinstance(plain, dict):
         raise ValueError(f"{path} must hold a JSON object, got {type(plain).__name__}")
     return plain
+
+
+def read_objects(path: Path) -> list[dict[str, Any]]:
+    """The objects in the list that a JSON file holds. Raises as `read_json`."""
+    plain = _parsed(path)
+    if not isinstance(plain, list) or not all(isinstance(one, dict) for one in plain):
+        raise ValueError(f"{path} must hold a JSON list of objects, got {type(plain).__name__}")
+    return plain
+
+
+def _parsed(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path} must hold JSON as it was written, got a damaged file: {error}") from error
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:

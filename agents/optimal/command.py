@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from agents.files import check_writable, read_json, write_csv
+from agents.files import check_writable, read_objects, write_csv
 from agents.optimal.batch import bounds
 from agents.optimal.certificate import Bound
 from agents.optimal.search import bound
@@ -98,11 +98,8 @@ def solve_file(tasks: Path, output: Path, above_table: bool | None, workers: int
 
 
 def _settings_in(tasks: Path) -> list[Settings]:
-    plain = read_json(tasks)
-    if not isinstance(plain, list) or not all(isinstance(one, dict) for one in plain):
-        raise ValueError(f"{tasks} must hold a list of objects, the arguments of one environment each")
     settings: list[Settings] = []
-    for k, arguments in enumerate(plain):
+    for k, arguments in enumerate(read_objects(tasks)):
         try:
             settings.append(Settings(**{"start_noise": 0.0, **arguments}))
         except (TypeError, ValueError) as error:

@@ -6,7 +6,7 @@ import pytest
 from agents import optimal
 from agents.control.trajectory import Trajectory
 from agents.optimal import command
-from agents.optimal.command import settings_of, solve_and_print
+from agents.optimal.command import settings_of, solve_and_print, solve_file
 from agents.optimal.store import Store
 from elbow_gym import paper_arm
 
@@ -45,3 +45,31 @@ def test_command_prints_the_certificate_and_writes_the_trajectory(tmp_path, monk
     assert f"return                {-found[0].cost:.6g}" in said
     assert f"mesh change           {found[0].certificate.mesh_change:.2g}" in said
     np.testing.assert_array_equal(Trajectory.load(output).voltage, found[0].optimum.trajectory.voltage)
+
+
+def test_tasks_of_a_file_become_rows_and_those_that_fail_are_named(tmp_path, monkeypatch, capsys):
+    given = []
+
+    def here(settings, **options):
+        given.extend(settings)
+        options["progress"](0)
+        return ["no guess converged"] * len(settings)
+
+    monkeypatch.setattr(command, "bounds", here)
+    tasks, output = tmp_path / "tasks.json", tmp_path / "bounds.csv"
+    tasks.write_text('[{"elbows": 1, "payload": 0.2}, {"elbows": 0}]')
+    solve_file(tasks, output, None, None)
+    assert [(one.elbow_joints, one.payload, one.start_noise) for one in given] == [((4,), 0.2, 0.0), ((), 0.0, 0.0)]
+    assert output.read_text().splitlines() == ["task,status", "0,no guess converged", "1,no guess converged"]
+    assert "task 1 failed: no guess converged\n0 of 2 tasks solved" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("text", ['{"elbows": 1}', "[1]", "["])
+def test_a_file_of_something_else_is_refused_before_anything_is_solved(tmp_path, text):
+    tasks = tmp_path / "tasks.json"
+    tasks.write_text(text)
+    with pytest.raises(ValueError, match=r"tasks\.json must hold"):
+        solve_file(tasks, tmp_path / "bounds.csv", None, None)
+    tasks.write_text('[{"elbow": 1}]')
+    with pytest.raises(ValueError, match=r"task 0 of .*tasks\.json: .*elbow"):
+        solve_file(tasks, tmp_path / "bounds.csv", None, None)
