@@ -2,8 +2,8 @@
 
 Steps are chosen for what motors make of an arm at rest. A state that a reset is given may hold many times the energy
 that a run comes to, and no closed form says how fast the links then whip. So the energy balance of such arms is checked
-after every control period, until they have lost that energy, and always that of arms whose currents outlast a control
-period and go on to drive links beyond their motors' free speed. One that keeps no balance in the finest steps ends.
+after every control period, until they have lost that energy, and always that of arms whose currents last so long that
+they go on to drive links beyond their motors' free speed. One that keeps no balance in the finest steps ends.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ GONE = 10.0
 """Turnover, as a multiple of the energy of its motion at the start, after which an arm moves as its motors make it."""
 ALWAYS = 1e300
 """Energy that is never gone [J]."""
+LASTING = 0.02
+"""Time constant of such currents [s]; the paper's arm has one of 1.5 ms."""
 # Rows of the parameters whose product is the decay R / L of the currents.
 DECAY = PARAMETERS.index("armature_resistance"), PARAMETERS.index("inverse_inductance")
 
@@ -64,12 +66,12 @@ class Retaking(Readings):
         return account(self._state, self._parameters)
 
     def _watch(self, chosen: NDArray[np.bool_]) -> None:
-        """Has the balance checked of those chosen arms that move, or whose currents outlast a control period."""
+        """Has the balance checked of those chosen arms that move, or whose currents are `LASTING`."""
         motion = np.zeros(int(chosen.sum()))
         if self._state[chosen, 1:3].any():
             motion = np.nan_to_num(stored(self._state, self._parameters).motion[chosen])
         resistance, inverse = (self._parameters[chosen, row] for row in DECAY)
-        lasting = (resistance * inverse).min(axis=1) * self.period < 1.0
+        lasting = (resistance * inverse).min(axis=1) * LASTING < 1.0
         self._motion[chosen] = np.where(lasting & (self.period > 0.0), ALWAYS, motion)
         self._restless = bool(self._motion.any())
 

@@ -84,11 +84,18 @@ def test_an_arm_that_no_steps_bring_through_stays_where_it_was_and_its_episode_e
 
 
 @pytest.mark.parametrize(("inductance", "always"), [(0.02, False), (0.03, True)])
-def test_balance_is_always_checked_where_currents_outlast_a_control_period(inductance, always):
+def test_balance_is_always_checked_where_currents_last(inductance, always):
     arm = replace(paper_arm(), motors=(MotorParameters(armature_inductance=inductance),) * 10)
     env = ElbowArmEnv(elbows=0, arm=arm)
     env.reset(seed=0)
     for action in ACTIONS[:3]:
         env.step(action)
-    # R / L is 55 and 37 1/s, and a control period a fiftieth of a second.
+    # R / L is 55 and 37 1/s.
     assert (env.episodes.simulator.get_state()["motion"][0] > 0.0) == always
+
+
+def test_the_papers_arm_costs_no_balance_at_the_rate_of_its_pd():
+    # A control period is a third of the currents' time constant there, which tells nothing of the links.
+    env = ElbowArmEnv(elbows=2, control_frequency=2000.0)
+    env.reset(seed=0)
+    assert not env.episodes.simulator.get_state()["motion"].any()
