@@ -96,17 +96,21 @@ class Retaking(Readings):
         Elbows that for an instant can hardly move against each other need them, and arms that whip. An arm that the
         finest steps do not bring through stays where it was. Returns the number of those, which are not `valid`.
         """
+        poor = self._poor(kept)
         for share in FINER:
+            if not poor.any():
+                break
             finer = np.repeat(steps / share, share)
-            for arm in np.flatnonzero(self._poor(kept)):
+            for arm in np.flatnonzero(poor):
                 self._put_back(arm, task[0], kept)
                 one = (int(arm), int(arm) + 1)
                 self._kernel.advance(
                     self._state, self._parameters, voltage, self._elbow_index, finer, self._summary, *one
                 )
                 self._kernel.observe(self._state, self._summary, self._clock, *task, first=one[0], end=one[1])
+            poor = self._poor(kept)
         if kept is not None:
-            for arm in np.flatnonzero(self._poor(kept)):
+            for arm in np.flatnonzero(poor):
                 self._put_back(arm, task[0], kept)
                 self._summary[arm, VALID] = 0.0
                 self._kernel.observe(self._state, self._summary, self._clock, *task, first=int(arm), end=int(arm) + 1)

@@ -1,4 +1,4 @@
-"""Hashes of seeded rollouts.
+"""Seeded rollouts, a planner's among them, and their hashes.
 
 As a module, `python -m tests.support.rollouts`, it prints two of them and how many functions had to be compiled.
 """
@@ -49,3 +49,13 @@ def compiled():
 
 if __name__ == "__main__":
     print(single(0), batch(0), compiled())
+
+
+def driven(env, planner, steps, seed=None):
+    """Actions of a planner in the control periods from a reset on."""
+    observation, _ = env.reset(seed=seed)
+    actions = []
+    for _ in range(steps):
+        actions.append(planner.predict(observation)[0])
+        observation = env.step(actions[-1])[0]
+    return np.array(actions)

@@ -11,19 +11,10 @@ from agents.planning import receding_horizon
 from agents.planning.receding_horizon import RecedingHorizon
 from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, paper_arm
 from elbow_gym.task.settings import Settings
+from tests.support.rollouts import driven
 
 pytest.importorskip("casadi")
 SHORT = {"horizon": 0.06}
-
-
-def driven(env, planner, steps, seed=None):
-    """Actions of a planner in the control periods from a reset on."""
-    observation, _ = env.reset(seed=seed)
-    actions = []
-    for _ in range(steps):
-        actions.append(planner.predict(observation)[0])
-        observation = env.step(actions[-1])[0]
-    return np.array(actions)
 
 
 def test_an_arms_plan_is_the_same_alone_and_in_any_batch_and_whenever_it_is_made():

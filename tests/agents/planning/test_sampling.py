@@ -8,18 +8,9 @@ import pytest
 from agents.planning import sampling
 from agents.planning.sampling import Plan, Sampling
 from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv, paper_arm
+from tests.support.rollouts import driven
 
 FEW = {"horizon": 0.06, "samples": 16, "rounds": 1}
-
-
-def driven(env, planner, steps, seed=None):
-    """Actions of a planner in the control periods from a reset on."""
-    observation, _ = env.reset(seed=seed)
-    actions = []
-    for _ in range(steps):
-        actions.append(planner.predict(observation)[0])
-        observation = env.step(actions[-1])[0]
-    return np.array(actions)
 
 
 def test_plans_follow_from_the_seed():

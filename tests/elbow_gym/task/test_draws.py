@@ -1,4 +1,4 @@
-"""What infos tell of draws: copies that are made when somebody looks, of the episode that the info is of."""
+"""Draws in infos: copies that are made when somebody looks, of the episode that the info is of."""
 
 import copy
 import pickle
