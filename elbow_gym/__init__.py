@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from elbow_gym.parameters import ArmParameters, LinkParameters, MotorParameters, paper_arm
     from elbow_gym.simulation.options import Conditions
     from elbow_gym.simulator import Simulator
+    from elbow_gym.suite import evaluation_tasks, reset_options
     from elbow_gym.table import TableParameters
     from elbow_gym.task.circle import Circle
     from elbow_gym.vector_env import ElbowArmVectorEnv
@@ -38,9 +39,11 @@ _HOMES = {
     "PDController": "baselines.pd",
     "Simulator": "simulator",
     "TableParameters": "table",
+    "evaluation_tasks": "suite",
     "load_policy": "baselines.policy",
     "motor": "motor_presets",
     "paper_arm": "parameters",
+    "reset_options": "suite",
 }
 
 __all__ = [
@@ -57,9 +60,11 @@ __all__ = [
     "PDController",
     "Simulator",
     "TableParameters",
+    "evaluation_tasks",
     "load_policy",
     "motor",
     "paper_arm",
+    "reset_options",
 ]
 
 
@@ -96,9 +101,27 @@ RANDOM: dict[str, Any] = {
     },
 }
 
-for _name, _arguments in (("ElbowArm", {}), ("ElbowArmTable", TABLE), ("ElbowArmRandom", RANDOM)):
+# Circle, payload and start pose differ in every episode, and the observation says which task it is.
+TASKS: dict[str, Any] = {
+    "circle": {
+        "center": [[1.35, 1.65], [1.35, 1.65], [0.25, 0.55]],
+        "radius": [0.05, 0.15],
+        "period": [3.0, 8.0],
+        # Up to 45 degrees.
+        "tilt": [0.0, 0.7853981633974483],
+        "tilt_axis": "random",
+        "phase": "random",
+        "direction": "random",
+    },
+    "randomize": "tasks",
+    "start_noise": 0.0,
+    "start_spread": 0.3,
+    "task_observation": True,
+}
+
+for _name, _arguments in {"": {}, "Table": TABLE, "Random": RANDOM, "Tasks": TASKS}.items():
     register(
-        id=f"{_name}-v0",
+        id=f"ElbowArm{_name}-v0",
         entry_point="elbow_gym.env:ElbowArmEnv",
         vector_entry_point="elbow_gym.vector_env:ElbowArmVectorEnv",
         kwargs=_arguments,

@@ -73,6 +73,13 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     | contact_force | n-1, with a table | N | 5 | 10000 | the table's normal force, joints 3 to n and the hand |
     | temperature_rise | n, with heat | K | 50 | 10000 | temperature of the windings above the ambient |
     | pending_voltage | n per period of the longest delay | V | 24 | 10000 | voltages still on their way, newest first |
+    | further_error | 9, with the task | m | 0.5 | 10 | hand minus the target 0.3, 0.6 and 1.2 s later, along x, y, z |
+    | target_velocity | 3, with the task | m/s | 0.2 | 100 | velocity of the target, along x, y, z |
+    | circle_radius | 1, with the task | m | 0.1 | 10 | radius of the circle |
+    | angular_velocity | 1, with the task | rad/s | 1 | 1000 | rate of the target's angle, negative if clockwise |
+    | plane_normal | 3, with the task | - | 1 | 1 | normal of the circle's plane, about which the angle grows |
+    | payload | 1, with the task | kg | 0.1 | 100 | mass at the hand |
+    | time_left | 1, with the task | - | 1 | 1 | share of the episode that is left |
 
     ## Rewards
 
@@ -83,7 +90,8 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     ## Starting State
 
     The paper's start pose (or, with `start="on_target"`, the pose with the hand on the circle) at rest without
-    current, plus normal noise of `start_noise` rad per joint, projected onto the elbows' plane.
+    current, plus normal noise of `start_noise` rad per joint, projected onto the elbows' plane. `start_spread` draws
+    poses within so many rad of every joint's angle there, with every joint and the hand at z >= 0.
     `reset(options={"state": {"q": ..., "q_dot": ..., "current": ...}, "phase": ...})` sets it exactly; the options
     `circle` and `parameters` (dicts) replace what would be drawn.
 
@@ -107,7 +115,8 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     | action_unit | "fraction" | "fraction" of the supply voltage, or "volt" |
     | start | "paper" | "paper" or "on_target" |
     | start_noise | 0.02 | standard deviation of the start pose [rad] |
-    | circle | None | dict of center, radius, period, plane, phase, direction, shape; ranges or "random" are drawn |
+    | start_spread | 0.0 | largest difference of a joint from the start pose [rad], drawn with every joint at z >= 0 |
+    | circle | None | dict of center, radius, period, plane, tilt, phase, shape...; ranges or "random" are drawn |
     | tracking_weight | 1.0 | cost per metre of tracking error |
     | energy_weight | 0.001 | cost per watt of electrical power |
     | regeneration | True | whether negative electrical power is credited, and taken back by the supply |
@@ -117,7 +126,8 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     | heat | False | whether windings warm up and their resistance grows |
     | supply_resistance | 0.0 | resistance inside the motors' common supply [ohm] |
     | payload | 0.0 | mass at the hand [kg] |
-    | randomize | None | dict of ranges drawn anew at each reset, see `elbow_gym.task.randomization` |
+    | randomize | None | dict of ranges drawn anew at each reset, see `elbow_gym.task.randomization`, or "tasks" |
+    | task_observation | False | whether the observation says what the task is |
 
     `render_mode` ("rgb_array" or "human", None by default), `render_width` (640) and `render_height` (480) choose the
     picture.
@@ -129,8 +139,8 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     A table adds contact_force [N] (joints 3 to n and the hand; radial, tangential, normal), load_bearing and
     contact_loss [J]; heat adds temperature_rise [K] and overheated; a supply's resistance adds supply_loss [J].
-    Where they are drawn, `parameters` and `circle` have the arm's and the circle's. All keys are there after a reset
-    and after a step.
+    Where they are drawn, `parameters` and `circle` have the arm's and the circle's, and `start` the start pose q; a
+    reset with `elbow_gym.reset_options(info)` sets them again. All keys are there after a reset and after a step.
 
     `energy_weight` and `tracking_weight` can be set on `env.unwrapped`, from the next step on; the other arguments can
     be read there. `env.spec.max_episode_steps` is the number of control periods in an episode.

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-ENVIRONMENTS = {"ElbowArm-v0": "elbows", "ElbowArmTable-v0": "table", "ElbowArmRandom-v0": "random"}
+ENVIRONMENTS = {
+    "ElbowArm-v0": "elbows",
+    "ElbowArmTable-v0": "table",
+    "ElbowArmRandom-v0": "random",
+    "ElbowArmTasks-v0": "tasks",
+}
 """Short name of a task by the id of its environment; the number of elbows follows "elbows"."""
 
 

@@ -42,7 +42,7 @@ A run: `block` gathers arms into lanes; per step `integration` evaluates four ti
 plane (`projection`); `block` scatters the lanes. `slots` says where each quantity is kept; the "Reads" and "Writes" of
 each pass name them, and a test compares both with the code. `template` and `build` compile a kernel for a lane count
 and a set of switches, `control` and `entries` are what Python calls. `observe` turns states into observations and
-rewards.
+rewards; `path` has the points of the target's path.
 
 One flat array, constant slot offsets and straight bodies under `for k in range(LANES)` let LLVM prove that rows do not
 overlap, and vectorise. Strict floating point and a sine of its own (`sine`) keep every lane's bits the same for any

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from elbow_gym.kernel.observe import path
+from elbow_gym.kernel.path import path
 from elbow_gym.kernel.template import sources
 
 NAME = re.compile(r"[a-z_0-9]+\.\w+_([0-9a-f]{10})-\d+\.py\d+\.(?:nbi|lock|\d+\.nbc)")

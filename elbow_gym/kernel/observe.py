@@ -1,4 +1,4 @@
-"""Observations, rewards and points of paths of a batch of arms.
+"""Observations and rewards of a batch of arms.
 
 Compiled, so that an arm's bits do not depend on how many others there are.
 """
@@ -12,11 +12,11 @@ from numba import types
 from numba.extending import intrinsic
 
 from elbow_gym.kernel import reward as plain
-from elbow_gym.kernel.rows import AHEAD, BELOW_TABLE, HAND, METERED, PAID, PERIODS, PHASE, TURN
-from elbow_gym.kernel.sine import sincos
-from elbow_gym.kernel.template import common_copy, compiled, compiled_entry, renamed
-
-_sincos = common_copy(sincos, compiled)
+from elbow_gym.kernel.path import coordinate, slope, turned
+from elbow_gym.kernel.rows import (
+    AHEAD, BELOW_TABLE, FURTHER, HAND, HORIZON, METERED, PAID, PERIODS, PHASE, RADIUS, ANGLE_RATE, TURN,
+)  # fmt: skip
+from elbow_gym.kernel.template import compiled, renamed
 
 
 def _multiply_and_add(context, a, b, c):
@@ -34,33 +34,31 @@ def _fused(a, b, c):
 
 
 _reward = compiled(
-    renamed(plain.reward, {"fused": compiled(_fused) if hasattr(_sincos, "py_func") else plain.fused}, "reward")
+    renamed(plain.reward, {"fused": compiled(_fused) if hasattr(turned, "py_func") else plain.fused}, "reward")
 )
-
-
-@compiled
-def _coordinate(coefficients, axis, c, s):
-    value = coefficients[0, axis]
-    ch, sh = c, s
-    for h in range(1, coefficients.shape[0], 2):
-        value += coefficients[h, axis] * ch + coefficients[h + 1, axis] * sh
-        ch, sh = ch * c - sh * s, sh * c + ch * s
-    return value
-
-
-@compiled_entry
-def path(coefficients, angle, out):
-    """Points out (m, 3) of a closed path at angles (m,): a Fourier series, rows 1, cos, sin, cos 2, sin 2..."""
-    for i in range(angle.size):
-        s, c = _sincos(angle[i])
-        for axis in range(3):
-            out[i, axis] = _coordinate(coefficients, axis, c, s)
 
 
 @compiled
 def _put(observation, b, m, scales, value):
     high = np.float32(scales[1, m])
     observation[b, m] = min(max(np.float32(value / scales[0, m]), -high), high)
+
+
+@compiled
+def _observe_task(observation, b, m, scales, task, path, angle, c, s, hand, periods):
+    """Fills the entries from m on that say what the task is; `hand` is the row of the arm's summary."""
+    for ahead in FURTHER:
+        s_later, c_later = turned(angle + ahead * task[AHEAD])
+        for axis in range(3):
+            _put(observation, b, m, scales, hand[HAND + axis] - coordinate(path, axis, c_later, s_later))
+            m += 1
+    for axis in range(3):
+        _put(observation, b, m, scales, task[ANGLE_RATE] * slope(path, axis, c, s))
+        m += 1
+    for column in range(RADIUS, HORIZON):
+        _put(observation, b, m, scales, task[column])
+        m += 1
+    _put(observation, b, m, scales, 1.0 - periods / task[HORIZON])
 
 
 @compiled
@@ -73,10 +71,11 @@ def observe(
         state: the arms' state rows, (B, rows, n).
         summary: the arms' summary, (B, columns).
         clock: steps and control periods since the reset, (B, 2).
-        task: what each arm is to do, (B, TASK_COLUMNS); the energy paid is brought up to date.
+        task: what each arm is to do, (B, TASK_COLUMNS), or (B, OBSERVED_TASK_COLUMNS) where the task is observed; the
+            energy paid is brought up to date.
         path: each arm's path as Fourier rows [m], (B, rows, 3).
         pose: what joint angles are counted from [rad], (n,).
-        starts: first entry of each of FEATURES in an observation, (7,).
+        starts: first entry of each of FEATURES in an observation, (7,), and of the task where that is observed, (8,).
         scales: quantity per unit of each entry, and the entries' upper bounds, (2, size).
         price: tracking weight [1/m], energy weight [1/W], control frequency [Hz], 1 if negative power counts, (4,).
         observation: filled.
@@ -87,8 +86,8 @@ def observe(
     n = state.shape[2]
     for b in range(first, end):
         angle = task[b, PHASE] + task[b, TURN] * clock[b, PERIODS]
-        s, c = _sincos(angle)
-        s_later, c_later = _sincos(angle + task[b, AHEAD])
+        s, c = turned(angle)
+        s_later, c_later = turned(angle + task[b, AHEAD])
         for row in range(3):
             for a in range(n):
                 value = state[b, row, a]
@@ -98,13 +97,17 @@ def observe(
         squared = 0.0
         for axis in range(3):
             hand = summary[b, HAND + axis]
-            error = hand - _coordinate(path[b], axis, c, s)
+            error = hand - coordinate(path[b], axis, c, s)
             squared += error * error
             _put(observation, b, starts[3] + axis, scales, error)
             _put(observation, b, starts[4] + axis, scales, hand - path[b, 0, axis])
-            _put(observation, b, starts[5] + axis, scales, hand - _coordinate(path[b], axis, c_later, s_later))
+            _put(observation, b, starts[5] + axis, scales, hand - coordinate(path[b], axis, c_later, s_later))
         _put(observation, b, starts[6], scales, c)
         _put(observation, b, starts[6] + 1, scales, s)
+        if starts.size > 7:
+            _observe_task(
+                observation, b, starts[7], scales, task[b], path[b], angle, c, s, summary[b], clock[b, PERIODS]
+            )  # fmt: skip
         for row, meter in METERED:
             total = 0.0
             for a in range(n):

@@ -48,6 +48,11 @@ TIMESTEPS, PERIODS = 0, 1
 # control periods, the target's angle at the reset [rad], how far it turns in a control period [rad] and to the
 # look-ahead target [rad], and the energy paid so far [J].
 HIGHEST, VOLTS, DELAY, PHASE, TURN, AHEAD, PAID, TASK_COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7
+# Behind them where the task is observed: the circle's radius [m], signed rate of its angle [rad/s] and normal, the
+# payload [kg], and the number of control periods in an episode.
+RADIUS, ANGLE_RATE, NORMAL, LOAD, HORIZON, OBSERVED_TASK_COLUMNS = 7, 8, 9, 12, 13, 14
+# Times of the further look-ahead targets, over that of the look-ahead target [-].
+FURTHER = (3.0, 6.0, 12.0)
 # Rows that `observe` fills beside the observation.
 FIGURES = (
     "tracking_error",

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from elbow_gym.kernel.rows import DELAY, HIGHEST, VOLTS
+from elbow_gym.kernel.rows import DELAY, HIGHEST, LOAD, TASK_COLUMNS, VOLTS
 from elbow_gym.parameters import Array
 from elbow_gym.task.arm_batch import Population
 from elbow_gym.task.settings import Settings
@@ -20,7 +20,7 @@ class Actuation:
         settings: the environment's arguments.
         population: the arms' parameters.
         task: the kernel's columns of what the arms are to do, (B, TASK_COLUMNS); these are kept up to date here:
-            largest action, volts per unit of action and delay.
+            largest action, volts per unit of action and delay, and the payload where the task is observed.
     """
 
     def __init__(self, settings: Settings, population: Population, task: Array) -> None:
@@ -45,7 +45,9 @@ class Actuation:
         self.take_values()
 
     def take_values(self) -> None:
-        """Takes over the supply voltages [V] and action delays [control periods] of the arms' values."""
+        """Takes over the supply voltages [V], action delays [control periods] and payloads [kg] of the arms' values."""
         supply = self._population.values["supply_voltage"]
         self._task[:, HIGHEST], self._task[:, VOLTS] = (1.0, supply) if self._fraction else (supply, 1.0)
         self._task[:, DELAY] = self._population.values["action_delay"]
+        if self._task.shape[1] > TASK_COLUMNS:
+            self._task[:, LOAD] = self._population.values["payload"]

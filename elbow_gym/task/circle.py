@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import numbers
 from collections.abc import Mapping, Sequence
@@ -14,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elbow_gym.checks import check_entries, finite, is_finite, positive
-from elbow_gym.kernel import observe
-from elbow_gym.parameters import ArmParameters, Array
+from elbow_gym.kernel.path import path as points_of
+from elbow_gym.parameters import Array
 from elbow_gym.task.fourier_path import (
     PLANES,
     Point,
@@ -25,12 +24,15 @@ from elbow_gym.task.fourier_path import (
     figure_eight_path,
     path_rate,
     plane_axes,
+    plane_normal,
     points_path,
+    tilted_axes,
 )
 from elbow_gym.task.ranges import Range, as_range, draw_number, ends, is_pair
-from elbow_gym.task.reach import reach_shortfall
 
 DIRECTIONS = ("counterclockwise", "clockwise")
+PLACING = ("center", "radius", "plane", "tilt", "tilt_axis")
+"""Fields that say where the path is, unless it is given by points."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +54,11 @@ class Circle:
     """Time of one turn [s], or (low, high)."""
     plane: str | tuple[str, ...] = "xy"
     """Plane: "xy", "xz", "yz" or "radial"; several of these to draw from, or "random" for any."""
+    tilt: Range = 0.0
+    """Angle by which the plane is turned about a line in it through the centre [rad], at most a right one, or (low,
+    high)."""
+    tilt_axis: float | str = 0.0
+    """Angle from the plane's first axis to that line [rad], or "random"."""
     phase: float | str = 0.0
     """Angle at time zero [rad], or "random"."""
     direction: str = "counterclockwise"
@@ -68,14 +75,16 @@ class Circle:
             "radius": as_range("circle radius", self.radius, positive),
             "period": as_range("circle period", self.period, positive),
             "plane": as_plane(self.plane),
-            "phase": _phase(self.phase),
+            "tilt": as_range("circle tilt", self.tilt, _tilt),
+            "tilt_axis": _angle("tilt_axis", self.tilt_axis),
+            "phase": _angle("phase", self.phase),
             "shape": as_shape(self.shape),
         }
         if not isinstance(self.direction, str) or self.direction not in (*DIRECTIONS, "random"):  # pyright: ignore
             raise ValueError(f'circle direction must be one of {DIRECTIONS} or "random", got {self.direction!r}')
         for name, value in checked.items():
             object.__setattr__(self, name, value)
-        unused = [name for name in self.drawn if name in ("center", "radius", "plane")]
+        unused = [name for name in self.drawn if name in PLACING]
         if unused and not isinstance(self.shape, str):
             raise ValueError(
                 f"circle {unused[0]} must not be random where the shape is given by points, "
@@ -95,7 +104,7 @@ class Circle:
     @property
     def drawn(self) -> tuple[str, ...]:
         """Names of the fields that `draw` draws, in its order."""
-        order = ("center", "radius", "period", "plane", "direction", "phase")
+        order = ("center", "radius", "period", "plane", "tilt", "tilt_axis", "direction", "phase")
         return tuple(name for name in order if _is_random(name, getattr(self, name)))
 
     @property
@@ -106,17 +115,18 @@ class Circle:
     def draw(self, generator: np.random.Generator) -> Circle:
         """A circle with everything fixed, the phase included.
 
-        Draws in this order, and only what is random: x, y and z of the centre, radius, period, plane, direction, phase.
-        Each takes one draw: `uniform(low, high)`, `integers` of the planes or directions, `uniform(-pi, pi)`.
+        Draws in this order, and only what is random: x, y and z of the centre, radius, period, plane, tilt, tilt_axis,
+        direction, phase. Each takes one draw: `uniform(low, high)`, `integers` of the planes or directions, and of the
+        other angles `uniform(-pi, pi)`.
         """
         values: dict[str, Any] = {}
         for name in self.drawn:
             value = getattr(self, name)
             if name == "center":
                 values[name] = tuple(draw_number(coordinate, generator) for coordinate in value)
-            elif name in ("radius", "period"):
+            elif name in ("radius", "period", "tilt"):
                 values[name] = draw_number(value, generator)
-            elif name == "phase":
+            elif name in ("phase", "tilt_axis"):
                 values[name] = generator.uniform(-np.pi, np.pi)
             else:
                 choices = self.planes if name == "plane" else DIRECTIONS
@@ -126,9 +136,10 @@ class Circle:
     @property
     def widest(self) -> Circle:
         """The largest circle, else in the middle of the ranges: first plane, counterclockwise from angle zero."""
-        choices = {"plane": self.planes[0], "direction": DIRECTIONS[0], "phase": 0.0}
+        choices = {"plane": self.planes[0], "direction": DIRECTIONS[0], "tilt_axis": 0.0, "phase": 0.0}
         means = {"center": tuple(float(np.mean(ends(x))) for x in self.center)}
-        means |= {"radius": ends(self.radius)[-1], "period": float(np.mean(ends(self.period)))}
+        means |= {name: float(np.mean(ends(getattr(self, name)))) for name in ("period", "tilt")}
+        means["radius"] = ends(self.radius)[-1]
         return replace(self, **{name: {**choices, **means}[name] for name in self.drawn})
 
     @property
@@ -164,13 +175,25 @@ class Circle:
     def path(self) -> Array:
         """Fourier rows of the path [m], (path_rows, 3): the centre, then what cos a, sin a, cos 2a, ... multiply.
 
-        ValueError while center, radius or plane are still to be drawn.
+        ValueError while one of `PLACING` is still to be drawn.
         """
         if isinstance(self.shape, tuple):
             return points_path(self.shape)
-        center, radius, plane = (self._fixed(name) for name in ("center", "radius", "plane"))
+        center, radius = self._fixed("center"), self._fixed("radius")
         of_shape = circle_path if self.shape == "circle" else figure_eight_path
-        return of_shape(center, radius, plane_axes(plane, center))
+        return of_shape(center, radius, self._axes)
+
+    @cached_property
+    def _axes(self) -> tuple[Array, Array]:
+        """Unit vectors at the angles zero and a quarter turn, each (3,)."""
+        plane, center, tilt, axis = (self._fixed(name) for name in ("plane", "center", "tilt", "tilt_axis"))
+        axes = plane_axes(plane, center)
+        return axes if tilt == 0.0 else tilted_axes(axes, tilt, axis)
+
+    @property
+    def normal(self) -> Array:
+        """Unit normal of the plane, about which the angle grows by the right-hand rule, (3,)."""
+        return plane_normal(self._axes)
 
     def position(self, angle: ArrayLike) -> Array:
         """Target position r_d [m], shape (..., 3), at an angle [rad], shape (...).   Eq. 28."""
@@ -188,7 +211,7 @@ class Circle:
 def _points(path: Array, angle: ArrayLike) -> Array:
     angle = np.asarray(angle, dtype=np.float64)
     points = np.empty((angle.size, 3))
-    observe.path(path, angle.ravel(), points)
+    points_of(path, angle.ravel(), points)
     return points.reshape(*angle.shape, 3)
 
 
@@ -207,12 +230,19 @@ def _center(center: object) -> tuple[Range, Range, Range]:
     return x, y, z
 
 
-def _phase(phase: object) -> float | str:
-    if not isinstance(phase, str):
-        return as_phase(phase)
-    if phase != "random":
-        raise ValueError(f'circle phase must be an angle in rad or "random", got {phase!r}')
-    return phase
+def _tilt(name: str, tilt: object) -> float:
+    angle = finite(name, tilt)
+    if abs(angle) > math.pi / 2.0:
+        raise ValueError(f"{name} must be at most a right angle (1.5708 rad) either way, got {angle:g}")
+    return angle
+
+
+def _angle(name: str, angle: object) -> float | str:
+    if not isinstance(angle, str):
+        return as_angle(name, angle)
+    if angle != "random":
+        raise ValueError(f'circle {name} must be an angle in rad or "random", got {angle!r}')
+    return angle
 
 
 def _is_random(name: str, value: Any) -> bool:
@@ -225,11 +255,11 @@ def _listed(value: Any) -> Any:
     return [_listed(entry) for entry in cast("Sequence[Any]", value)] if isinstance(value, tuple) else value
 
 
-def as_phase(phase: object) -> float:
-    """A phase [rad] as a float; ValueError unless it is a finite number."""
-    if isinstance(phase, bool) or not isinstance(phase, numbers.Real):
-        raise ValueError(f"phase must be an angle in rad, got {phase!r}")
-    angle = finite("phase", phase)
+def as_angle(name: str, given: object) -> float:
+    """An angle [rad] as a float; ValueError naming it unless it is a finite number."""
+    if isinstance(given, bool) or not isinstance(given, numbers.Real):
+        raise ValueError(f"{name} must be an angle in rad, got {given!r}")
+    angle = finite(name, given)
     # The target needs the angle alone; whole turns would cost it digits.
     return math.remainder(angle, 2.0 * math.pi) if abs(angle) > 1e3 else angle
 
@@ -243,42 +273,3 @@ def as_circle(circle: object) -> Circle:
     if isinstance(circle, Mapping):
         return Circle.from_dict(cast("Mapping[str, Any]", circle))
     raise ValueError(f"circle must be a dict of its fields or None, got {circle!r}")
-
-
-def check_reachable(arm: ArmParameters, elbows: Sequence[int], circle: Circle) -> None:
-    """Raises ValueError, with the distance missing, when a point of the path is out of the hand's reach.
-
-    Covers every circle that may be drawn. Where lengths are random too, give the arm with the shortest ones.
-    """
-    points = extreme_points(circle)
-    shortfall = reach_shortfall(arm, elbows, points)
-    worst = int(shortfall.argmax())
-    if shortfall[worst] > 0.0:
-        point = tuple(round(float(value), 4) for value in points[worst])
-        what = "circle" if circle.shape == "circle" else "path"
-        raise ValueError(
-            f"{what} must lie within the hand's reach, got the point {point} {shortfall[worst]:.4g} m outside"
-        )
-
-
-def extreme_points(circle: Circle) -> Array:
-    """Points (m, 3) that are out of reach whenever a point of any circle that may be drawn is.
-
-    Outward the shortfall is convex in the point, and the point affine in the centre (in the radial plane: in its height
-    and its distance from the axis, itself convex), so that the worst centre is a corner of its box; the worst radius is
-    the largest, because circles and eights are symmetric about their centre. A hole around the base is not convex: the
-    last point represents it, the nearest one of a box around all circles, which may refuse a set that just misses it.
-    """
-    # No wave of the path goes by with fewer than 45 samples.
-    angle = np.linspace(0.0, 2.0 * np.pi, 1 + 45 * max(8, circle.path_rows // 2))
-    if not {"center", "radius", "plane"} & set(circle.drawn):
-        return circle.position(angle)
-    bounds, radius = [ends(coordinate) for coordinate in circle.center], ends(circle.radius)[-1]
-    corners = [
-        replace(circle, center=center, radius=radius, plane=plane).position(angle)
-        for center in itertools.product(*bounds)
-        for plane in circle.planes
-    ]
-    spread = radius * np.array([any(axis in ("xyz" if p == "radial" else p) for p in circle.planes) for axis in "xyz"])
-    nearest = np.clip(0.0, [low for low, *_ in bounds] - spread, [high for *_, high in bounds] + spread)
-    return np.concatenate([*corners, nearest[None]])

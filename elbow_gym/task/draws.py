@@ -9,6 +9,7 @@ import numpy as np
 
 from elbow_gym.task.arm_batch import Population
 from elbow_gym.task.infos import of_arm
+from elbow_gym.task.settings import Settings
 from elbow_gym.task.targets import Targets
 
 
@@ -52,13 +53,16 @@ class Draws:
     """What infos tell of the draws of B arms: nothing where no arm has drawn, or was given, what others have not.
 
     Args:
+        settings: the environment's arguments.
         population: parameters of the arms.
         targets: their targets.
-        circles: whether circles are drawn.
     """
 
-    def __init__(self, population: Population, targets: Targets, circles: bool) -> None:
-        self._population, self._targets, self._circles = population, targets, circles
+    def __init__(self, settings: Settings, population: Population, targets: Targets) -> None:
+        self._population, self._targets = population, targets
+        self.starts = np.zeros((len(targets.path), settings.parsed_arm.n_joints))
+        """Start poses [rad], (B, n), told where they are spread."""
+        self._circles, self._spread = settings.parsed_circle.random, settings.start_spread > 0.0
         self.renew()
 
     def renew(self) -> None:
@@ -67,8 +71,8 @@ class Draws:
         self._kept: dict[int, dict[str, dict[str, Any]]] = {}
 
     def tell(self, info: dict[str, Any], arm: int | slice) -> None:
-        """Puts dicts of parameters and circle into an info: arrays with one row per arm, or what is one arm's."""
-        if not self._parameters and not self._circles:
+        """Puts dicts of parameters, circle and start into an info: rows of all arms, or what is one arm's."""
+        if not (self._parameters or self._circles or self._spread):
             return
         if isinstance(arm, slice):
             info.update(self._rows())
@@ -85,4 +89,6 @@ class Draws:
             rows["parameters"] = self._population.copy()
         if self._circles:
             rows["circle"] = self._targets.figures()
+        if self._spread:
+            rows["start"] = {"q": self.starts.copy()}
         return rows

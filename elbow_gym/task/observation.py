@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from elbow_gym.kernel.rows import FURTHER, HORIZON, OBSERVED_TASK_COLUMNS, TASK_COLUMNS
 from elbow_gym.parameters import Array
 
 OBSERVATION_VERSION = 1
@@ -47,6 +48,36 @@ SWITCHED_FEATURES = (
     Feature("pending_voltage", "V", 24.0, 1e4, "voltages still on their way, newest first"),
 )
 """Features behind the others, in environments where they are switched on."""
+TASK_FEATURES = (
+    Feature(
+        "further_error",
+        "m",
+        0.5,
+        10.0,
+        "hand minus the target 0.3, 0.6 and 1.2 s later, along x, y, z",
+        tuple(f"{LOOKAHEAD * times:.1f}s_{axis}" for times in FURTHER for axis in AXES),
+    ),
+    Feature("target_velocity", "m/s", 0.2, 100.0, "velocity of the target, along x, y, z", AXES),
+    Feature("circle_radius", "m", 0.1, 10.0, "radius of the circle", ("",)),
+    Feature("angular_velocity", "rad/s", 1.0, 1000.0, "rate of the target's angle, negative if clockwise", ("",)),
+    Feature("plane_normal", "-", 1.0, 1.0, "normal of the circle's plane, about which the angle grows", AXES),
+    Feature("payload", "kg", 0.1, 100.0, "mass at the hand", ("",)),
+    Feature("time_left", "-", 1.0, 1.0, "share of the episode that is left", ("",)),
+)
+"""Features at the end, in environments whose task is observed."""
+
+
+def task_columns(num_envs: int, horizon: int | None) -> Array:
+    """The kernel's columns of what B arms are to do, zero but for the length of an episode.
+
+    Args:
+        num_envs: B, the number of arms.
+        horizon: control periods in an episode where the task is observed, None where it is not.
+    """
+    columns = np.zeros((num_envs, TASK_COLUMNS if horizon is None else OBSERVED_TASK_COLUMNS))
+    if horizon is not None:
+        columns[:, HORIZON] = horizon
+    return columns
 
 
 @dataclass(frozen=True)
@@ -56,11 +87,14 @@ class ObservationLayout:
     n_joints: int
     switched: Mapping[str, int] = field(default_factory=dict[str, int])
     """Number of entries of each switched feature; zero where it is missing."""
+    task: bool = False
+    """Whether the task is observed, as `TASK_FEATURES` have it."""
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:
         """Features of the observation, in order."""
-        return (*FEATURES, *(feature for feature in SWITCHED_FEATURES if self.switched.get(feature.name)))
+        switched = (feature for feature in SWITCHED_FEATURES if self.switched.get(feature.name))
+        return (*FEATURES, *switched, *(TASK_FEATURES if self.task else ()))
 
     @cached_property
     def sizes(self) -> tuple[int, ...]:
@@ -78,8 +112,16 @@ class ObservationLayout:
 
     @cached_property
     def starts(self) -> NDArray[np.int64]:
-        """First entry of each of `FEATURES`, (7,)."""
-        return np.array([self.slices[feature.name].start for feature in FEATURES], dtype=np.int64)
+        """First entry of each of `FEATURES`, (7,), and of `TASK_FEATURES` where the task is observed, (8,)."""
+        first = (*FEATURES, *(TASK_FEATURES[:1] if self.task else ()))
+        return np.array([self.slices[feature.name].start for feature in first], dtype=np.int64)
+
+    @cached_property
+    def noisy(self) -> NDArray[np.int64]:
+        """Entries that have the sensors' noise: all that rest on what is measured of joints and hand."""
+        measured = [feature.name for feature in FEATURES if feature.name != "target_angle"]
+        measured += ["further_error"] if self.task else []
+        return np.concatenate([np.arange(self.size)[self.slices[name]] for name in measured])
 
     @property
     def size(self) -> int:
@@ -88,14 +130,14 @@ class ObservationLayout:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """One name per entry, with its unit: `joint_angle_1 [rad]`, `hand_error_x [m]`, `contact_force_hand [N]`."""
+        """One name per entry, with its unit: `joint_angle_1 [rad]`, `hand_error_x [m]`, `circle_radius [m]`."""
         n = self.n_joints
         suffixes = {
             "contact_force": (*range(3, n + 1), "hand"),
             "pending_voltage": [f"{1 + k // n}_{1 + k % n}" for k in range(self.switched.get("pending_voltage", 0))],
         }
         return tuple(
-            f"{f.name}_{suffix} [{f.unit}]"
+            f"{f.name}{suffix and '_'}{suffix} [{f.unit}]"
             for f in self.features
             for suffix in suffixes.get(f.name, f.suffixes or range(1, n + 1))
         )

@@ -30,6 +30,22 @@ POSITIVE = tuple(
 """Quantities that are above zero, but for the length of link 1, which only yaws."""
 
 
+LARGEST_PAYLOADS = (0.05, 0.3, 0.3)
+"""Largest payload of "tasks" with no elbow on the table, with one, and with two or more [kg]."""
+
+
+def as_ranges(given: object, elbows: int) -> Any:
+    """Ranges by name: those given, or of "tasks", whose payloads 24 V can hold with so many elbows on the table.
+
+    Raises ValueError on another text.
+    """
+    if not isinstance(given, str):
+        return given
+    if given != "tasks":
+        raise ValueError(f'randomize must be a dict of ranges, "tasks" or None, got {given!r}')
+    return {"payload": (0.0, LARGEST_PAYLOADS[min(elbows, 2)])}
+
+
 def _count(name: str, value: object) -> float:
     number = non_negative(name, value)
     if number != int(number):

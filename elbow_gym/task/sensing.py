@@ -63,9 +63,9 @@ class Sensing:
         )
         """Whether infos hold nothing of switched-on features, and the motors get the voltages that are asked for."""
         self._switched = [name for name, size in sizes.items() if size]
-        self.layout = ObservationLayout(n, sizes)
+        self.layout = ObservationLayout(n, sizes, settings.task_observation)
         """The observation's entries, those of the switched-on features included."""
-        self.noise = np.zeros((simulator.num_envs, int(self.layout.slices["target_angle"].start)))
+        self.noise = np.zeros((simulator.num_envs, self.layout.noisy.size))
 
     def set_noise(self, chosen: NDArray[np.int64], generators: Sequence[np.random.Generator]) -> None:
         """Sets the chosen arms' generators of noise, and its standard deviations from the arms' values."""
@@ -87,12 +87,12 @@ class Sensing:
         if not self._noisy:
             return
         deviation = self._population.values["sensor_noise"]
-        noisy = self.noise.shape[1]
+        noisy = layout.noisy
         anew = np.ones(len(observation), dtype=np.bool_) if resting is None else ~resting
         self.noise[anew] = 0.0
         for i in np.flatnonzero(anew & (deviation > 0.0)):
-            self.noise[i] = float(deviation[i]) * self._generators[int(i)].standard_normal(noisy)
-        observation[:, :noisy] = np.clip(observation[:, :noisy] + self.noise, -layout.high[:noisy], layout.high[:noisy])
+            self.noise[i] = float(deviation[i]) * self._generators[int(i)].standard_normal(noisy.size)
+        observation[:, noisy] = np.clip(observation[:, noisy] + self.noise, -layout.high[noisy], layout.high[noisy])
 
     def _quantity(self, name: str) -> Array:
         if name == "contact_force":

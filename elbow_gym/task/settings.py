@@ -19,10 +19,11 @@ from elbow_gym.simulation.rates import Start, rates, worst_rows
 from elbow_gym.simulation.state_checks import check_angles
 from elbow_gym.simulation.step_limit import INTEGRATORS, check_option, check_timestep, schedule
 from elbow_gym.table import TableParameters, as_table
-from elbow_gym.task.circle import Circle, as_circle, check_reachable, extreme_points
+from elbow_gym.task.circle import Circle, as_circle
 from elbow_gym.task.default_circle import default_circle
-from elbow_gym.task.randomization import Randomization
+from elbow_gym.task.randomization import Randomization, as_ranges
 from elbow_gym.task.ranges import ends
+from elbow_gym.task.reach import check_reachable, extreme_points
 
 ACTION_UNITS = ("fraction", "volt")
 STARTS = ("paper", "on_target")
@@ -57,6 +58,9 @@ class Settings:
     """Start pose: "paper", the arm's nominal pose; "on_target", the pose whose hand is on the circle."""
     start_noise: float = 0.02
     """Standard deviation of the start pose [rad], projected onto the elbows' plane."""
+    start_spread: float = 0.0
+    """Largest difference of a joint's angle from the start pose's [rad]: uniform draws, put on the elbows' plane, until
+    every joint and the hand are at z >= 0."""
     circle: Mapping[str, Any] | Circle | None = None
     """Dict of `Circle` fields, the paper's where one is missing; None: the paper's, or one in the reach of an arm that
     cannot follow it with its last two links."""
@@ -78,8 +82,10 @@ class Settings:
     """Resistance inside the motors' common supply [ohm], which makes its voltage sag."""
     payload: float = 0.0
     """Mass at the hand [kg]."""
-    randomize: Mapping[str, Any] | None = None
-    """Dict of ranges that `Randomization` draws from at each reset."""
+    randomize: Mapping[str, Any] | str | None = None
+    """Dict of ranges that `Randomization` draws from at each reset, or "tasks": payloads that the elbows allow."""
+    task_observation: bool = False
+    """Whether observations say what the task is: circle, payload, targets further ahead and the time left."""
 
     def __post_init__(self) -> None:
         if isinstance(self.arm, str) and self.arm.endswith(ARM_SUFFIX):
@@ -87,10 +93,12 @@ class Settings:
             object.__setattr__(self, "arm", as_arm(self.arm).to_dict())
         for name in ("control_frequency", "duration", "voltage_limit"):
             positive(name, getattr(self, name))
-        for name in ("start_noise", "tracking_weight", "energy_weight"):
+        for name in ("start_noise", "start_spread", "tracking_weight", "energy_weight"):
             non_negative(name, getattr(self, name))
         for name, allowed in (("action_unit", ACTION_UNITS), ("start", STARTS), ("integrator", INTEGRATORS)):
             one_of(name, getattr(self, name), allowed)
+        if not isinstance(self.task_observation, bool):
+            raise ValueError(f"task_observation must be True or False, got {self.task_observation!r}")
         if self.duration * self.control_frequency > LARGEST_INTEGER:
             raise ValueError(f"duration must be a countable number of control periods, got {self.duration}")
         if self.horizon < 1:
@@ -114,8 +122,12 @@ class Settings:
     def check_followable(self, circle: Circle) -> None:
         """Raises ValueError where a target turns more than once in a control period, or goes below a compliant table.
 
-        Covers every circle that may be drawn.
+        So it does where the task is observed and the path has no plane. Covers every circle that may be drawn.
         """
+        if self.task_observation and not isinstance(circle.shape, str):
+            raise ValueError(
+                f"circle shape must have a plane where the task is observed, got {len(circle.shape)} points"
+            )
         shortest = ends(circle.period)[0]
         if shortest < self.control_period * (1.0 - HAIR):
             raise ValueError(
@@ -173,7 +185,7 @@ class Settings:
     @cached_property
     def randomization(self) -> Randomization:
         """Ranges that each reset draws from."""
-        return Randomization(self.randomize)
+        return Randomization(as_ranges(self.randomize, len(self.elbow_joints)))
 
     @cached_property
     def parsed_circle(self) -> Circle:

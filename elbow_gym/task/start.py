@@ -22,6 +22,8 @@ from elbow_gym.task.settings import Settings
 STATE_ENTRIES = ("q", "q_dot", "current", "temperature_rise")
 # Raising links between rigid elbows and putting these back on the table comes closer each time [rounds].
 ROUNDS = 200
+TRIES = 1000
+"""Most poses that are drawn for an arm until one will do, as one in three does of the paper's arm."""
 
 
 def given_state(state: object) -> dict[str, Any] | None:
@@ -77,7 +79,7 @@ def drawn_poses(
         simulator: simulator of the arms.
         population: parameters of the arms.
         pose: start pose of the nominal arm [rad], (n,).
-        generators: random generators of the chosen arms, which draw the noise.
+        generators: random generators of the chosen arms, which draw the spread, then the noise.
         circles: circles of the chosen arms.
         chosen: numbers of arms, (k,).
     """
@@ -90,10 +92,42 @@ def drawn_poses(
         arms = population.arms(chosen) if moved else [simulator.arm] * len(chosen)
         for i, arm, circle in zip(chosen, arms, circles, strict=True):
             q[i] = inverse_kinematics(arm, q[i], circle.position(float(circle.phase)))[0]
+    if settings.start_spread > 0.0:
+        q = spread_poses(simulator, q, settings.start_spread, generators, chosen)
     if noise > 0.0:
         q[chosen] += noise * np.stack([generator.standard_normal(simulator.arm.n_joints) for generator in generators])
         q = simulator.on_table(q)
     return q if settings.conditions.surface is None else above_table(simulator, q)
+
+
+def spread_poses(
+    simulator: Simulator,
+    q: Array,
+    spread: float,
+    generators: Sequence[np.random.Generator],
+    chosen: NDArray[np.int64],
+) -> Array:
+    """Poses [rad], (B, n), in which every joint of the chosen arms (k,) is within `spread` of `q` and at z >= 0.
+
+    An arm's generator draws `uniform(-spread, spread, n)`, which is put on the elbows' plane, until it is so.
+
+    Raises ValueError where it does not find such a pose.
+    """
+    everyone, drawn = simulator.parameters(np.arange(simulator.num_envs)), q
+    sought = np.zeros(simulator.num_envs, dtype=np.bool_)
+    sought[chosen] = True
+    for _ in range(TRIES):
+        tried = q.copy()
+        for i, generator in zip(chosen, generators, strict=True):
+            if sought[i]:
+                tried[i] += generator.uniform(-spread, spread, q.shape[1])
+        drawn = np.where(sought[:, None], simulator.on_table(tried), drawn)
+        far = np.abs(drawn - q).max(axis=1) > spread + PLANE_TOLERANCE
+        sought &= far | (_heights(drawn, everyone).min(axis=1) < -PLANE_TOLERANCE)
+        if not sought.any():
+            return drawn
+    pose = q[sought][0].round(4).tolist()
+    raise ValueError(f"start_spread must allow poses above the table, got none in {TRIES} draws about {pose}")
 
 
 def above_table(simulator: Simulator, q: Array) -> Array:

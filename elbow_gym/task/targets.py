@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from elbow_gym.checks import as_dict, require_entries
-from elbow_gym.kernel.rows import AHEAD, PHASE, TURN
+from elbow_gym.kernel.rows import AHEAD, ANGLE_RATE, NORMAL, PHASE, RADIUS, TASK_COLUMNS, TURN
 from elbow_gym.parameters import Array
-from elbow_gym.task.circle import Circle, as_phase
+from elbow_gym.task.circle import Circle, as_angle
 from elbow_gym.task.observation import LOOKAHEAD
 
 
@@ -21,7 +21,7 @@ class Targets:
     Args:
         circle: path, or ranges from which one is drawn for each arm at its reset.
         task: the kernel's columns of what the arms are to do, (B, TASK_COLUMNS); these are kept up to date here:
-            the targets' angle at the reset, and how far they turn.
+            the targets' angle at the reset, how far they turn, and the circles where the task is observed.
         control_period: time between two actions [s].
     """
 
@@ -34,9 +34,9 @@ class Targets:
         self.path = np.repeat(first.path[None], num_envs, axis=0)
         """Each arm's path as Fourier rows [m], (B, rows, 3)."""
         self._rate = np.full(num_envs, first.rate)
-        self._radius, self._circle_period = np.empty(num_envs), np.empty(num_envs)
-        self._measure(range(num_envs))
+        self._figures = {name: np.empty(num_envs) for name in ("radius", "period", "tilt", "tilt_axis")}
         self._task = task
+        self._measure(range(num_envs))
         self._pace()
         self._alike = not circle.random
 
@@ -45,12 +45,15 @@ class Targets:
         self._task[:, TURN], self._task[:, AHEAD] = self._rate * self._period, self._rate * LOOKAHEAD
 
     def _measure(self, chosen: Iterable[int]) -> None:
-        """Radii and periods of the chosen arms' circles, for infos."""
+        """Figures of the chosen arms' circles, for infos and, where the task is observed, for observations."""
+        observed = self._task.shape[1] > TASK_COLUMNS
         for i in chosen:
-            self._radius[i], self._circle_period[i] = (
-                np.asarray(self.circles[i].radius),
-                np.asarray(self.circles[i].period),
-            )
+            circle = self.circles[i]
+            for name, figures in self._figures.items():
+                figures[i] = getattr(circle, name)
+            if observed:
+                self._task[i, RADIUS], self._task[i, ANGLE_RATE] = self._figures["radius"][i], circle.rate
+                self._task[i, NORMAL : NORMAL + 3] = circle.normal
 
     def draw(self, circle: Circle, generators: Sequence[np.random.Generator], phase: object = None) -> list[Circle]:
         """New circles, each by its arm's generator, which start at `phase` [rad] if it is given.
@@ -58,7 +61,7 @@ class Targets:
         A given phase is not drawn, whatever else is.
         """
         if phase is not None:
-            circle = Circle.from_dict({**circle.to_dict(), "phase": as_phase(phase)})
+            circle = Circle.from_dict({**circle.to_dict(), "phase": as_angle("phase", phase)})
         return [circle.draw(generator) for generator in generators]
 
     def check(self, circles: Sequence[Circle]) -> None:
@@ -118,11 +121,10 @@ class Targets:
         return drawn
 
     def figures(self) -> dict[str, Array]:
-        """Centre [m] (B, 3), radius [m], period [s], phase [rad] and signed rate [rad/s] of each circle, (B,)."""
+        """Centre [m] (B, 3) and, (B,), radius [m], period [s], tilt, its axis and phase [rad], signed rate [rad/s]."""
         return {
             "center": self.path[:, 0].copy(),
-            "radius": self._radius.copy(),
-            "period": self._circle_period.copy(),
+            **{name: figures.copy() for name, figures in self._figures.items()},
             "phase": self._task[:, PHASE].copy(),
             "rate": self._rate.copy(),
         }

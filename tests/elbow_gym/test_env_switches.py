@@ -41,7 +41,7 @@ SWITCHES = {
         "circle": {"radius": [0.05, 0.1], "phase": "random", "plane": "random"},
     },
 }
-IDS = ("ElbowArmTable-v0", "ElbowArmRandom-v0")
+IDS = ("ElbowArmTable-v0", "ElbowArmRandom-v0", "ElbowArmTasks-v0")
 
 
 @pytest.mark.parametrize("name", SWITCHES)

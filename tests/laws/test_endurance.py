@@ -142,6 +142,7 @@ ENDURED = {
     "no elbow": ("ElbowArm-v0", {"elbows": 0}),
     "table": ("ElbowArmTable-v0", {}),
     "random arms and circles": ("ElbowArmRandom-v0", {}),
+    "tasks": ("ElbowArmTasks-v0", {}),
     "several objectives": ("mo-ElbowArm-v0", {}),
     "rubbing elbows": ("ElbowArm-v0", {"elbow_friction": 0.1}),
     "heat, supply and rough gears": (

@@ -11,7 +11,7 @@ import pytest
 
 from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv
 from elbow_gym.kinematics import elbow_heights
-from elbow_gym.task.observation import FEATURES, SWITCHED_FEATURES, ObservationLayout
+from elbow_gym.task.observation import FEATURES, SWITCHED_FEATURES, TASK_FEATURES, ObservationLayout
 from elbow_gym.task.settings import Settings
 
 PAGE = inspect.getdoc(ElbowArmEnv)
@@ -43,7 +43,7 @@ def test_observation_table_is_the_features():
         (name, unit, float(scale), float(limit), meaning)
         for name, _, unit, scale, limit, meaning in table("Observation Space")
     ]
-    assert rows == [feature[:5] for feature in (*FEATURES, *SWITCHED_FEATURES)]
+    assert rows == [feature[:5] for feature in (*FEATURES, *SWITCHED_FEATURES, *TASK_FEATURES)]
 
 
 @pytest.mark.parametrize("n", [3, 10])
@@ -55,13 +55,20 @@ def test_observation_table_counts_the_entries(n):
 
 def test_switched_features_have_the_entries_that_the_table_says():
     env = ElbowArmEnv(table=True, elbow_friction=0.1, heat=True, randomize={"action_delay": [0, 2]})
-    sizes = dict(zip([name for name, *_ in table("Observation Space")], env.episodes.layout.sizes, strict=True))
+    sizes = dict(zip([name for name, *_ in table("Observation Space")[:10]], env.episodes.layout.sizes, strict=True))
     assert (sizes["contact_force"], sizes["temperature_rise"], sizes["pending_voltage"]) == (9, 10, 20)
-    assert [entries.split(",")[0].split(" ")[0] for _, entries, *_ in table("Observation Space")[-3:]] == [
+    assert [entries.split(",")[0].split(" ")[0] for _, entries, *_ in table("Observation Space")[7:10]] == [
         "n-1",
         "n",
         "n",
     ]
+
+
+def test_entries_of_the_task_are_as_many_as_the_table_says():
+    layout = ObservationLayout(10, task=True)
+    counts = tuple(int(entries.split(",")[0]) for _, entries, *_ in table("Observation Space")[10:])
+    assert counts == layout.sizes[len(FEATURES) :]
+    assert sum(counts) == layout.size - ObservationLayout(10).size == 19
 
 
 def test_switches_add_the_info_keys_that_the_page_names():

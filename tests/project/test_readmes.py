@@ -67,7 +67,7 @@ def test_snippet_of_a_room_runs(page, snippet, tmp_path, monkeypatch):
 
 
 def test_every_room_has_a_snippet_where_it_has_an_interface():
-    assert [PAGES[page].count("```python\n") for page in PAGES] == [1, 14, 2, 0]
+    assert [PAGES[page].count("```python\n") for page in PAGES] == [1, 15, 2, 0]
 
 
 def test_readme_is_short_and_has_the_two_commands():
@@ -223,7 +223,7 @@ def test_infos_of_the_environment_are_documented():
     )
     table = PAGES["elbow_gym/README.md"].split("| info |")[1].split("\n\n")[0]
     named = {name for line in table.splitlines()[2:] for name in re.findall(r"`(\w+)`", cells(line)[0])}
-    assert named - {"circle"} == set(env.reset(seed=0)[1])
+    assert named - {"circle", "start"} == set(env.reset(seed=0)[1])
 
 
 def test_front_of_the_objectives_is_that_of_the_committed_optima():

@@ -8,8 +8,8 @@ import hashlib
 import numpy as np
 
 from elbow_gym import ElbowArmEnv, ElbowArmVectorEnv
-from elbow_gym.kernel import observe
 from elbow_gym.kernel.build import kernel
+from elbow_gym.kernel.path import path
 from elbow_gym.kernel.slots import BLOCK_LANES
 
 SETTINGS = {"circle": {"phase": "random"}, "duration": 0.5}
@@ -44,7 +44,7 @@ def batch(seed, num_envs=20, num_threads=1):
 def compiled():
     """How many of the compiled functions that a rollout calls were not in the cache."""
     entries = [entry for lanes in (1, BLOCK_LANES) for entry in kernel(lanes)]
-    return sum(sum(entry.stats.cache_misses.values()) for entry in (*entries, observe.path))
+    return sum(sum(entry.stats.cache_misses.values()) for entry in (*entries, path))
 
 
 if __name__ == "__main__":

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from elbow_gym import kernel
-from elbow_gym.kernel import observe, template
+from elbow_gym.kernel import template
 from elbow_gym.kernel.build import kernel as build_kernel
+from elbow_gym.kernel.path import path
 from elbow_gym.kernel.template import TEMPLATES
 
-FILES = sorted(path.stem for path in Path(kernel.__file__).parent.glob("*.py") if path.stem != "__init__")
+FILES = sorted(file.stem for file in Path(kernel.__file__).parent.glob("*.py") if file.stem != "__init__")
 
 
 def test_importing_the_names_of_rows_loads_no_compiler():
@@ -37,7 +38,7 @@ def test_no_two_files_of_the_kernel_bind_one_name_to_different_objects():
 
 
 def test_names_of_all_that_is_cached_carry_the_digest_of_all_sources(monkeypatch, tmp_path):
-    cached = [*build_kernel(1), observe.path]
+    cached = [*build_kernel(1), path]
     if not hasattr(cached[0], "py_func"):
         pytest.skip("nothing is cached without the compiler")
     assert all(entry.py_func.__qualname__.endswith(template.sources()) for entry in cached)

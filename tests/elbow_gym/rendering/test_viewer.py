@@ -53,7 +53,7 @@ def started(steps=3, **settings):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", RENDER_MODES)
-@pytest.mark.parametrize("name", ["ElbowArm-v0", "ElbowArmTable-v0", "ElbowArmRandom-v0"])
+@pytest.mark.parametrize("name", ["ElbowArm-v0", "ElbowArmTable-v0", "ElbowArmRandom-v0", "ElbowArmTasks-v0"])
 def test_both_checkers_find_nothing_in_any_mode(name, mode):
     env = gym.make(f"elbow_gym:{name}", render_mode=mode, **SMALL)
     check_env(env.unwrapped)

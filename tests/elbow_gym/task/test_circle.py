@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from elbow_gym import ArmParameters, Circle, LinkParameters, MotorParameters, paper_arm
-from elbow_gym.task.circle import as_circle, as_phase, check_reachable, extreme_points, reach_shortfall
+from elbow_gym.task.circle import as_angle, as_circle
+from elbow_gym.task.reach import check_reachable, extreme_points, reach_shortfall
 
 CENTER = np.array([1.5, 1.5, 0.4])
 OUTWARD = np.array([1.0, 1.0, 0.0]) / math.sqrt(2.0)
@@ -108,13 +109,13 @@ def test_center_may_be_an_array():
 
 @pytest.mark.parametrize(("phase", "kept"), [(2000.0 * math.pi + 0.3, 0.3), (-1e3, -1e3), (1e3, 1e3)])
 def test_whole_turns_are_taken_out_of_a_large_phase(phase, kept):
-    assert as_phase(phase) == pytest.approx(kept, abs=1e-12)
+    assert as_angle("phase", phase) == pytest.approx(kept, abs=1e-12)
 
 
 @pytest.mark.parametrize("value", [True, "random", math.inf])
 def test_phase_must_be_a_finite_number(value):
     with pytest.raises(ValueError, match=f"^phase must .*, got {value!r}$"):
-        as_phase(value)
+        as_angle("phase", value)
 
 
 @pytest.mark.parametrize("phase", [-1e6, 1e12, 1e300])
@@ -168,3 +169,25 @@ def test_elbows_bring_a_circle_above_them_out_of_reach():
     check_reachable(paper_arm(), (), circle)
     with pytest.raises(ValueError, match=r"2.0\) 0\.8 m outside"):
         check_reachable(paper_arm(), (4, 7), circle)
+
+
+def test_a_tilted_plane_is_turned_about_the_line_at_the_axis_angle():
+    # About the y axis by 45 degrees: the point at angle zero goes down from the x axis, the one on y stays.
+    circle = Circle(center=(1.5, 1.5, 0.4), radius=0.1, tilt=math.pi / 4.0, tilt_axis=math.pi / 2.0)
+    half = 0.1 / math.sqrt(2.0)
+    expected = [(1.5 + half, 1.5, 0.4 - half), (1.5, 1.6, 0.4)]
+    np.testing.assert_allclose(circle.position([0.0, math.pi / 2.0]), expected, rtol=0.0, atol=1e-15)
+    np.testing.assert_allclose(circle.normal, (math.sqrt(0.5), 0.0, math.sqrt(0.5)), rtol=0.0, atol=1e-15)
+    # Upright planes turn likewise; a tilt of zero leaves every bit.
+    upright = Circle(plane="xz", tilt=0.3, tilt_axis=0.0)
+    np.testing.assert_allclose(upright.normal, (0.0, -math.cos(0.3), -math.sin(0.3)), rtol=0.0, atol=1e-15)
+    np.testing.assert_array_equal(Circle(tilt_axis=1.0).path, Circle().path)
+
+
+def test_velocity_in_a_tilted_plane_is_across_its_normal_and_as_fast():
+    circle = Circle(radius=0.15, period=3.0, tilt=0.6, tilt_axis=2.0, direction="clockwise")
+    velocity = circle.velocity(np.linspace(0.0, 6.0, 20))
+    np.testing.assert_allclose(velocity @ circle.normal, 0.0, rtol=0.0, atol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(velocity, axis=1), 0.15 * 2.0 * math.pi / 3.0, rtol=1e-12)
+    around = np.cross(circle.position(0.5) - np.array(circle.center), circle.velocity(0.5))
+    assert around @ circle.normal < 0.0

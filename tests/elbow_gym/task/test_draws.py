@@ -73,7 +73,11 @@ def test_an_info_keeps_the_draws_of_its_own_episode_and_shares_none():
     for info in (first, later):
         np.testing.assert_array_equal(info["parameters"]["mass"], expected)
         assert isinstance(info["parameters"]["payload"], np.float64)
-    assert first["circle"].keys() == later["circle"].keys() == {"center", "radius", "period", "phase", "rate"}
+    assert (
+        first["circle"].keys()
+        == later["circle"].keys()
+        == {*("center", "radius", "period", "tilt", "tilt_axis", "phase", "rate")}
+    )
     assert not np.shares_memory(first["parameters"]["mass"], later["parameters"]["mass"])
     later["parameters"]["mass"][:] = 0.0
     np.testing.assert_array_equal(env.reset(seed=1)[1]["parameters"]["mass"], expected)

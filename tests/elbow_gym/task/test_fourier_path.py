@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from elbow_gym import Circle, paper_arm
-from elbow_gym.task.circle import check_reachable
 from elbow_gym.task.fourier_path import path_rate, points_path
+from elbow_gym.task.reach import check_reachable
 from tests.support.strategies import between
 
 CORNERS = [(1.4, 1.4, 0.3), (1.6, 1.4, 0.4), (1.6, 1.6, 0.5), (1.4, 1.6, 0.4)]

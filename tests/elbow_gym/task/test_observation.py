@@ -36,11 +36,19 @@ VERSION_1 = {
     "contact_force": ("N", 5.0, 1e4),
     "temperature_rise": ("K", 50.0, 1e4),
     "pending_voltage": ("V", 24.0, 1e4),
+    "further_error": ("m", 0.5, 10.0),
+    "target_velocity": ("m/s", 0.2, 100.0),
+    "circle_radius": ("m", 0.1, 10.0),
+    "angular_velocity": ("rad/s", 1.0, 1000.0),
+    "plane_normal": ("-", 1.0, 1.0),
+    "payload": ("kg", 0.1, 100.0),
+    "time_left": ("-", 1.0, 1.0),
 }
 
 
 def test_units_scales_and_limits_are_those_of_version_1():
-    found = {one.name: (one.unit, one.scale, one.limit) for one in (*task.FEATURES, *task.SWITCHED_FEATURES)}
+    features = (*task.FEATURES, *task.SWITCHED_FEATURES, *task.TASK_FEATURES)
+    found = {one.name: (one.unit, one.scale, one.limit) for one in features}
     assert (task.OBSERVATION_VERSION, found) == (1, VERSION_1)
 
 

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from elbow_gym import ArmParameters, Circle, LinkParameters, MotorParameters, paper_arm
-from elbow_gym.task.circle import PLANES, check_reachable
-from elbow_gym.task.reach import reach_shortfall
+from elbow_gym.task.circle import PLANES
+from elbow_gym.task.ranges import ends
+from elbow_gym.task.reach import check_reachable, extreme_points, reach_shortfall
 from tests.support.strategies import between
 
 EVERYTHING = {
@@ -194,3 +195,30 @@ def test_the_widest_circle_is_fixed_and_the_largest_that_may_be_drawn():
     assert (widest.period, widest.phase, widest.direction) == (4.5, 0.0, "counterclockwise")
     assert widest.radius == max(circle.radius for circle in [widest, *drawn(EVERYTHING)])
     assert Circle(radius=0.2).widest == Circle(radius=0.2)
+
+
+TILTED = {"radius": [0.05, 0.2], "tilt": [0.1, 0.7], "tilt_axis": "random", "phase": "random"}
+
+
+def test_tilts_are_drawn_behind_the_plane_and_before_the_direction():
+    generator = np.random.default_rng(7)
+    circle = Circle.from_dict({**TILTED, "direction": "random"}).draw(np.random.default_rng(7))
+    radius, tilt, axis = generator.uniform(0.05, 0.2), generator.uniform(0.1, 0.7), generator.uniform(-np.pi, np.pi)
+    direction = ("counterclockwise", "clockwise")[generator.integers(2)]
+    phase = generator.uniform(-np.pi, np.pi)
+    assert circle == Circle(radius=radius, tilt=tilt, tilt_axis=axis, direction=direction, phase=phase)
+
+
+@pytest.mark.parametrize(
+    "ranges",
+    [TILTED, {**TILTED, "plane": "radial"}, {"tilt": [-0.4, 1.5], "tilt_axis": 0.7}, {"tilt_axis": "random"}],
+    ids=["any axis", "radial", "one axis", "no tilt"],
+)
+def test_no_tilted_circle_that_may_be_drawn_leaves_the_hull_of_the_extreme_points(ranges):
+    extremes = extreme_points(Circle.from_dict(ranges))
+    points = np.concatenate([circle.position(np.linspace(0.0, 6.3, 50)) for circle in drawn(ranges, 100)])
+    directions = np.random.default_rng(1).normal(size=(60, 3))
+    assert ((extremes @ directions.T).max(axis=0) >= (points @ directions.T).max(axis=0) - 1e-4).all()
+    # Nor is a circle refused that is farther from the drawn ones than 2 % of the radius: the last point is a hole's.
+    largest = ends(Circle.from_dict(ranges).radius)[-1]
+    assert np.linalg.norm(extremes[:-1] - np.array([1.5, 1.5, 0.4]), axis=1).max() <= 1.02 * largest
