@@ -27,6 +27,8 @@ CONTROLLER_COLOURS = {
     "sac_random": "#005A41",
     "receding_horizon": "#AA3377",
     "sampling_mpc": "#BBBB33",
+    "receding_horizon_payload": "#D499BB",
+    "sampling_mpc_payload": "#77771F",
 }
 CONTROLLER_NAMES = {
     "pd_paper": "PD, no limit",
@@ -45,6 +47,8 @@ CONTROLLER_NAMES = {
     "sac_random": "SAC, drawn arms and circles",
     "receding_horizon": "receding horizon",
     "sampling_mpc": "sampling MPC",
+    "receding_horizon_payload": "receding horizon, payload estimated",
+    "sampling_mpc_payload": "sampling MPC, payload estimated",
 }
 CONTROLLER_MARKERS = {
     "pd_paper": "v",
@@ -63,6 +67,8 @@ CONTROLLER_MARKERS = {
     "sac_random": "H",
     "receding_horizon": "8",
     "sampling_mpc": ".",
+    "receding_horizon_payload": "1",
+    "sampling_mpc_payload": "2",
 }
 
 

@@ -33,12 +33,12 @@ class InverseDynamics:
     Args:
         arm: the arm.
         elbows: joint numbers held at z = 0.
-        payload: point mass at the hand [kg].
+        payload: point mass at the hand [kg], a number or a symbol of CasADi's.
     """
 
-    def __init__(self, arm: ArmParameters, elbows: Sequence[int] = (), payload: float = 0.0) -> None:
+    def __init__(self, arm: ArmParameters, elbows: Sequence[int] = (), payload: Any = 0.0) -> None:
         n = arm.n_joints
-        self.arm, self.elbows = arm, tuple(elbows)
+        self.arm, self.elbows, self.payload = arm, tuple(elbows), payload
         self.torque_constant = arm.of_motors("joint_torque_constant")
         self.resistance = arm.of_motors("armature_resistance")
         self.inductance = arm.of_motors("armature_inductance")
@@ -53,14 +53,17 @@ class InverseDynamics:
         # Row k: how far along each link the centre of mass of link k lies.
         lever = np.tril(np.ones((n, n)), -1) * length + np.diag(length / 2.0)
         # The payload is the last link's end: a whole length along every link, and nothing that turns.
-        lever, mass = np.vstack([lever, length]), np.append(mass, payload)
-        self._coupling = lever.T @ (mass[:, None] * lever)
+        self._coupling = payload * np.outer(length, length) + lever.T @ (mass[:, None] * lever)
         transverse, axial = arm.of_links("transverse_inertia"), arm.of_links("axial_inertia")
         self._transverse, self._difference = np.diag(transverse), np.diag(transverse - axial)
         self._axial = float(axial.sum())
-        self._weight = np.diag(arm.gravity * (mass @ lever))
+        self._weight = payload * np.diag(arm.gravity * length) + np.diag(arm.gravity * (mass @ lever))
         # Columns: how much of each link's height lies below an elbow.
         self._below = np.array([[length[k] * (k + 1 < e) for e in self.elbows] for k in range(n)]).reshape(n, -1)
+
+    def loaded(self, payload: Any) -> InverseDynamics:
+        """The same arm with another payload [kg], a number or a symbol of CasADi's."""
+        return InverseDynamics(self.arm, self.elbows, payload)
 
     def torque(self, q: Any, q_dot: Any, q_ddot: Any) -> Any:
         """Torque of a motion without elbows [N m], (..., n), rotor inertia and all friction in.   Eqs 22-25.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -53,8 +54,11 @@ and is read at 10 kHz."""
 PLANNERS: dict[str, Untrained] = {
     "receding_horizon": Untrained({}, RecedingHorizon, 800.0),
     "sampling_mpc": Untrained({}, Sampling, 300.0),
+    "receding_horizon_payload": Untrained({}, partial(RecedingHorizon, estimate_payload=True), 800.0),
+    "sampling_mpc_payload": Untrained({}, partial(Sampling, estimate_payload=True), 300.0),
 }
-"""The planners by name. They take too long for a comparison with everybody, so that `entries` leaves them out."""
+"""The planners by name, the last two with an estimate of the payload. They take too long for a comparison with
+everybody, so that `entries` leaves them out."""
 LQR_EFFORT = 20.0
 """Time of the LQR's control period, times the PD's: its gains are found before the first."""
 

@@ -15,27 +15,26 @@ ARRIVALS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
 """Times at which the motions reach the path [s]."""
 
 
-def approaches(inverse: InverseDynamics, view: View, pose: Array, periods: int, period: float) -> Array:
+def approaches(view: View, pose: Array, periods: int, period: float) -> Array:
     """Voltages of motions to the path, one for each of `ARRIVALS`, [V], (k, periods, n); none where it is out of reach.
 
     The idle joints keep their angles, or go to those of `pose` where the last two links would not reach the path.
     Until it arrives a motion is a polynomial of fifth degree that starts without acceleration.
 
     Args:
-        inverse: motion equations of the arm.
-        view: state of the arm and its targets, up to the last arrival at least.
+        view: state and motion equations of the arm, and its targets up to the last arrival at least.
         pose: another pose for the idle joints [rad], (n,).
         periods: number of control periods.
         period: length of a control period [s].
     """
     for idle in (view.state["q"], pose):
         try:
-            path = HandPlacement(inverse.arm, idle).joints(view.target, view.velocity)
+            path = HandPlacement(view.inverse.arm, idle).joints(view.target, view.velocity)
         except ValueError:
             # The last two links do not cover the path from this pose.
             continue
         motions = [_motion(view.state, *path, max(1, round(time / period)), period) for time in ARRIVALS]
-        return np.stack([_voltages(inverse, *motion, period)[:periods] for motion in motions])
+        return np.stack([_voltages(view.inverse, *motion, period)[:periods] for motion in motions])
     return np.empty((0, periods, len(pose)))
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,10 +42,13 @@ class Branches:
         """Negative returns of plans from a view's state, the tail included, (S,).
 
         Args:
-            view: state of the arm and its targets.
+            view: state and motion equations of the arm, and its targets.
             plans: voltages [V], (S, N, n), S being one of the sizes.
         """
-        self._root.reset(options={"state": view.state, "phase": view.angle})
+        options: dict[str, Any] = {"state": view.state, "phase": view.angle}
+        if view.inverse.payload > 0.0:
+            options["parameters"] = {"payload": view.inverse.payload}
+        self._root.reset(options=options)
         batch, periods = self._batches[len(plans)], plans.shape[1]
         batch.set_state(self._root.get_state(), arms=np.arange(len(plans)))
         tracking, energy = self._settings.tracking_weight, self._settings.energy_weight
@@ -54,4 +59,6 @@ class Branches:
             error = np.linalg.norm(simulator.hand_position - target, axis=-1)
             cost += tracking * error - info["reward_energy"]
         last = view.target[periods - 1], view.velocity[periods - 1]
-        return cost + self._tail.cost(simulator.q, simulator.q_dot, *last, tracking, energy)
+        return cost + replace(self._tail, inverse=view.inverse).cost(
+            simulator.q, simulator.q_dot, *last, tracking, energy
+        )

@@ -4,8 +4,8 @@ One control period under held voltages is one element with `degree` Radau points
 armature (1.5 ms) and the light links (5 ms) are faster than the period (20 ms). The motion equations are
 inverse-dynamics residuals, so that no linear solve enters an expression; the elbows' velocities are held at zero (held
 heights, of index 3, have multipliers that swing between the points). Every point's derivatives are one small CasADi
-function mapped over all points, the rest is constant. Start, targets and prices are parameters of the program, so that
-a planner solves one program in every control period.
+function mapped over all points, the rest is constant. Start, targets, payload and prices are parameters of the program,
+so that a planner solves one program in every control period.
 """
 
 from __future__ import annotations
@@ -69,14 +69,22 @@ class Transcription:
         rest = np.zeros(self.n)
         self.begin({"q": problem.start, "q_dot": rest, "current": rest}, problem.target)
 
-    def begin(self, start: Mapping[str, Array], target: Array, velocity: Array | None = None) -> None:
-        """Sets where the periods start and what the hand is to follow.
+    def begin(
+        self,
+        start: Mapping[str, Array],
+        target: Array,
+        velocity: Array | None = None,
+        inverse: InverseDynamics | None = None,
+    ) -> None:
+        """Sets where the periods start, what the hand is to follow and what it carries.
 
         Args:
             start: q [rad], q_dot [rad/s] and current [A], each (n,), with the elbows at z = 0.
             target: targets at the ends of the control periods [m], (N, 3).
             velocity: velocity of the last of them [m/s], (3,), for the tail; zero when None.
+            inverse: motion equations of the arm with another payload than before; the same when None.
         """
+        self.inverse = self.inverse if inverse is None else inverse
         self._start = {name: start[name] for name in STATE}
         self._target, self._velocity = target, np.zeros(3) if velocity is None else velocity
         state = np.concatenate([start[name] for name in STATE])
@@ -93,13 +101,14 @@ class Transcription:
         A, P, upper = (casadi_matrix(matrix) for matrix in (rows, self._power_form, power))
         x = ca.MX.sym("x", self.size)
         aims = 3 * self.periods
-        parameters = ca.MX.sym("p", 3 + aims + 3 + self.n)
+        parameters = ca.MX.sym("p", 4 + aims + 3 + self.n)
         scale, multipliers = ca.MX.sym("f"), ca.MX.sym("g", count * points.conditions + rows.shape[0])
-        smoothing, tracking, energy = parameters[0], parameters[1], parameters[2]
+        smoothing, tracking, energy, payload = ca.vertsplit(parameters[:4])
+        loaded = ca.repmat(payload, 1, count)
         Z = ca.reshape(x[: self._voltages], points.size, count)
         # The reward depends on the last point of each period alone.
         last = np.tile(np.arange(self.degree) == self.degree - 1, self.periods).astype(float)
-        aim, velocity, first = ca.vertsplit(parameters[3:], np.cumsum([0, aims, 3, self.n]).tolist())
+        aim, velocity, first = ca.vertsplit(parameters[4:], np.cumsum([0, aims, 3, self.n]).tolist())
         at = ca.DM(np.repeat(np.eye(self.periods), self.degree, axis=1))
         target = ca.mtimes(ca.reshape(aim, 3, self.periods), at)
         # Of the power's linear part the first period's voltages alone have any.
@@ -107,18 +116,18 @@ class Transcription:
         seen = (Z, target, ca.repmat(smoothing, 1, count), ca.DM(last[None]) * tracking)
         cost = ca.sum2(points.cost.map(count)(*seen)) + energy * (ca.dot(x, ca.mtimes(P, x)) / 2 + ca.dot(p, x))
         slope = ca.vertcat(ca.vec(points.slope.map(count)(*seen)), ca.MX.zeros(volts)) + energy * (ca.mtimes(P, x) + p)
-        conditions = ca.vertcat(ca.vec(points.residual.map(count)(Z)), ca.mtimes(A, x))
+        conditions = ca.vertcat(ca.vec(points.residual.map(count)(Z, loaded)), ca.mtimes(A, x))
         blocks = ca.horzcat(
             ca.diagcat(*[points.jacobian_sparsity] * count), ca.Sparsity(count * points.conditions, volts)
         )
-        jacobian = ca.vertcat(ca.MX(blocks, ca.vec(points.jacobian.map(count)(Z))), ca.MX(A))
+        jacobian = ca.vertcat(ca.MX(blocks, ca.vec(points.jacobian.map(count)(Z, loaded))), ca.MX(A))
         own = ca.reshape(multipliers[: count * points.conditions], points.conditions, count)
-        curvature = ca.vec(points.hessian.map(count)(*seen, ca.repmat(scale, 1, count), own))
+        curvature = ca.vec(points.hessian.map(count)(*seen, loaded, ca.repmat(scale, 1, count), own))
         places = ca.diagcat(*[points.hessian_sparsity] * count, ca.Sparsity(volts, volts))
         hessian = ca.MX(places, curvature) + scale * energy * upper
         if tail is not None:
             before, behind = self._voltages - points.size, volts
-            of_end = (Z[:, -1], aim[-3:], velocity, smoothing, tracking, energy)
+            of_end = (Z[:, -1], aim[-3:], velocity, smoothing, tracking, energy, payload)
             written = tail.written(points.size)
             cost += written.cost(*of_end)
             slope += ca.vertcat(ca.MX.zeros(before), written.slope(*of_end), ca.MX.zeros(behind))
@@ -176,9 +185,10 @@ class Transcription:
         return x, (lam_x, lam_g), solver.stats()
 
     def _parameters(self, smoothing: float) -> Array:
-        prices = smoothing, self.problem.settings.tracking_weight, self.problem.settings.energy_weight
+        settings = self.problem.settings
+        numbers = smoothing, settings.tracking_weight, settings.energy_weight, self.inverse.payload
         first = self._linear[self._voltages : self._voltages + self.n]
-        return np.concatenate([prices, self._target.ravel(), self._velocity, first])
+        return np.concatenate([numbers, self._target.ravel(), self._velocity, first])
 
     def residuals(self, x: Array, smoothing: float, multipliers: Multipliers) -> tuple[float, float, float]:
         """How far a point is from meeting the first-order conditions.

@@ -18,13 +18,15 @@ class Points:
     """CasADi functions of one collocation point: residuals, cost and their derivatives.
 
     Args:
-        inverse: motion equations of the arm.
+        inverse: motion equations of the arm, whose payload is an argument of the functions.
         above_table: whether joints 3..n and the hand must have z >= 0.
     """
 
     def __init__(self, inverse: InverseDynamics, above_table: bool) -> None:
         ca = casadi()
         arm, n, p = inverse.arm, inverse.arm.n_joints, len(inverse.elbows)
+        payload = ca.SX.sym("payload")
+        inverse = inverse.loaded(payload)
         q, q_dot, q_ddot, current = (ca.SX.sym(name, 1, n) for name in NAMES[:4])
         force = ca.SX.sym(NAMES[4], 1, p)
         z = ca.horzcat(q, q_dot, q_ddot, current, force).T
@@ -45,11 +47,11 @@ class Points:
         hessian = ca.triu(ca.hessian(scale * cost + ca.dot(multipliers, conditions), z)[0])
         seen = [z, target, smoothing, weight]
         self.size = z.numel()
-        self.residual = ca.Function("residual", [z], [conditions])
+        self.residual = ca.Function("residual", [z, payload], [conditions])
         self.cost = ca.Function("cost", seen, [cost])
         self.slope = ca.Function("slope", seen, [ca.gradient(cost, z)])
-        self.jacobian = ca.Function("jacobian", [z], [ca.vertcat(*jacobian.nonzeros())])
-        self.hessian = ca.Function("hessian", [*seen, scale, multipliers], [ca.vertcat(*hessian.nonzeros())])
+        self.jacobian = ca.Function("jacobian", [z, payload], [ca.vertcat(*jacobian.nonzeros())])
+        self.hessian = ca.Function("hessian", [*seen, payload, scale, multipliers], [ca.vertcat(*hessian.nonzeros())])
         self.jacobian_sparsity, self.hessian_sparsity = jacobian.sparsity(), hessian.sparsity()
 
 

@@ -75,13 +75,14 @@ class RecedingHorizon(Planner):
     Args:
         env: the environment that it will act in.
         horizon: time that plans look ahead [s].
+        estimate_payload: whether the payload is estimated from the motion; otherwise there is taken to be none.
 
     Raises:
         ValueError: the environment has what the program does not know, which is named, or CasADi is missing.
     """
 
-    def __init__(self, env: Environment, *, horizon: float = HORIZON) -> None:
-        super().__init__(env, horizon, RESTING, BRAKING)
+    def __init__(self, env: Environment, *, horizon: float = HORIZON, estimate_payload: bool = False) -> None:
+        super().__init__(env, horizon, RESTING, BRAKING, estimate_payload=estimate_payload)
         check_modelled(self.settings)
         if find_spec("casadi") is None:
             raise ValueError('casadi must be installed for receding-horizon control: pip install "elbow-gym[optimal]"')
@@ -93,7 +94,7 @@ class RecedingHorizon(Planner):
 
     def _decide(self, arm: int, view: View) -> Array:
         program = self._program
-        program.begin(view.state, view.target, view.velocity[-1])
+        program.begin(view.state, view.target, view.velocity[-1], view.inverse)
         before = self._plans.get(arm)
         hand = hand_position(self.interface.arm, view.state["q"])
         near = float(np.clip(SHARE * np.linalg.norm(hand - view.target[0]), SMOOTHING, FAR_SMOOTHING))
@@ -121,5 +122,5 @@ class RecedingHorizon(Planner):
         program, pose = self._program, view.state["q"]
         q = np.broadcast_to(pose, (program.periods, program.degree, program.n))
         still = np.zeros_like(q)
-        hold = self.inverse.resistance * self.inverse.hold(pose).current
+        hold = view.inverse.resistance * view.inverse.hold(pose).current
         return Plan(program.join(q, still, still, np.tile(hold, (program.periods, 1))))

@@ -66,12 +66,20 @@ class Sampling(Planner):
         horizon: time that plans look ahead [s].
         samples: plans played side by side, more than `ARRIVALS` has.
         rounds: how often in a control period.
+        estimate_payload: whether the payload is estimated from the motion; otherwise there is taken to be none.
     """
 
     def __init__(
-        self, env: Environment, seed: int = 0, *, horizon: float = HORIZON, samples: int = SAMPLES, rounds: int = ROUNDS
+        self,
+        env: Environment,
+        seed: int = 0,
+        *,
+        horizon: float = HORIZON,
+        samples: int = SAMPLES,
+        rounds: int = ROUNDS,
+        estimate_payload: bool = False,
     ) -> None:
-        super().__init__(env, horizon, RESTING, BRAKING, seen=ARRIVALS[-1])
+        super().__init__(env, horizon, RESTING, BRAKING, ARRIVALS[-1], estimate_payload)
         self._seed, self._rounds = seed, positive_integer("rounds", rounds)
         self._samples = positive_integer("samples", samples)
         if samples < len(ARRIVALS) + 2:
@@ -106,8 +114,8 @@ class Sampling(Planner):
     def _guesses(self, view: View) -> Array:
         """Plans that compete with the samples [V], (k, N, n): standing still, and approaches."""
         interface = self.interface
-        still = self.inverse.resistance * self.inverse.hold(view.state["q"]).current
-        found = approaches(self.inverse, view, interface.pose, self.periods, interface.control_period)
+        still = view.inverse.resistance * view.inverse.hold(view.state["q"]).current
+        found = approaches(view, interface.pose, self.periods, interface.control_period)
         return np.concatenate([np.tile(still, (1, self.periods, 1)), found])
 
     def _sides(self, view: View) -> Array:

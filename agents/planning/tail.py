@@ -6,6 +6,7 @@ hand's distance is taken a moment later, when what moves at the end of the plan 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 class Written(NamedTuple):
-    """CasADi functions of (z, target, velocity, smoothing, tracking weight, energy weight), z being the last point."""
+    """CasADi functions of the last point z, target, velocity, smoothing, tracking weight, energy weight and payload."""
 
     cost: Any
     slope: Any
@@ -33,18 +34,18 @@ SPEED = 0.02
 """Price of a joint's rate at a plan's end [s^2/rad^2], without which a plan throws the arm into a cheap last pose."""
 
 
+@dataclass(frozen=True)
 class Tail:
-    """Cost of the time after a plan, in units of the return.
+    """Cost of the time after a plan, in units of the return."""
 
-    Args:
-        inverse: motion equations of the arm.
-        control_period: time between two actions [s].
-        duration: time that the arm is taken to rest in the last pose [s].
-        braking: time that the hand is taken to go on as it moves at the plan's end [s].
-    """
-
-    def __init__(self, inverse: InverseDynamics, control_period: float, duration: float, braking: float) -> None:
-        self._inverse, self._periods, self._braking = inverse, duration / control_period, braking
+    inverse: InverseDynamics
+    """Motion equations of the arm."""
+    control_period: float
+    """Time between two actions [s]."""
+    duration: float
+    """Time that the arm is taken to rest in the last pose [s]."""
+    braking: float
+    """Time that the hand is taken to go on as it moves at the plan's end [s]."""
 
     def cost(
         self, q: Array, q_dot: Array, target: Array, velocity: Array, tracking_weight: float, energy_weight: float
@@ -59,11 +60,12 @@ class Tail:
             tracking_weight: cost per metre [1/m].
             energy_weight: cost per watt [1/W].
         """
-        inverse, ahead = self._inverse, target + self._braking * velocity
-        error = np.linalg.norm(hand_position(inverse.arm, q + self._braking * q_dot) - ahead, axis=-1)
+        inverse, ahead = self.inverse, target + self.braking * velocity
+        error = np.linalg.norm(hand_position(inverse.arm, q + self.braking * q_dot) - ahead, axis=-1)
         power = (inverse.resistance * inverse.hold(q).current ** 2).sum(axis=-1)
         thrown = SPEED * (q_dot**2).sum(axis=-1)
-        return self._periods * (tracking_weight * error + energy_weight * power) + thrown
+        periods = self.duration / self.control_period
+        return periods * (tracking_weight * error + energy_weight * power) + thrown
 
     def written(self, size: int) -> Written:
         """`cost` for CasADi, with the smoothed error sqrt(e^2 + smoothing^2).
@@ -72,11 +74,13 @@ class Tail:
             size: length of a collocation point's variables, of which q and q_dot are the first.
         """
         ca = casadi()
-        inverse, n, p = self._inverse, self._inverse.arm.n_joints, len(self._inverse.elbows)
+        payload = ca.SX.sym("payload")
+        inverse = self.inverse.loaded(payload)
+        n, p = inverse.arm.n_joints, len(inverse.elbows)
         z, target, velocity = ca.SX.sym("z", size), ca.SX.sym("target", 3), ca.SX.sym("velocity", 3)
         smoothing, tracking, energy = (ca.SX.sym(name) for name in ("smoothing", "tracking", "energy"))
         q, q_dot = z[:n].T, z[n : 2 * n].T
-        error = hand(inverse, q + self._braking * q_dot) - target - self._braking * velocity
+        error = hand(inverse, q + self.braking * q_dot) - target - self.braking * velocity
         # sum R i^2 with the elbow forces of least loss: what remains of the torque without the elbows' part.
         root = ca.DM(np.diag(np.sqrt(inverse.resistance) / inverse.torque_constant))
         held = ca.mtimes(inverse.holding_torque(q), root)
@@ -85,9 +89,10 @@ class Tail:
             unit = ca.vertcat(*(ca.mtimes(inverse.elbow_torque(q, ca.DM(row[None])), root) for row in np.eye(p)))
             along = ca.mtimes(unit, held.T)
             power -= ca.dot(along, ca.solve(ca.mtimes(unit, unit.T), along))
-        cost = self._periods * (tracking * ca.sqrt(ca.dot(error, error) + smoothing**2) + energy * power)
+        periods = self.duration / self.control_period
+        cost = periods * (tracking * ca.sqrt(ca.dot(error, error) + smoothing**2) + energy * power)
         cost += SPEED * ca.dot(q_dot, q_dot)
-        seen = [z, target, velocity, smoothing, tracking, energy]
+        seen = [z, target, velocity, smoothing, tracking, energy, payload]
         hessian = ca.triu(ca.hessian(cost, z)[0])
         return Written(
             ca.Function("tail", seen, [cost]),

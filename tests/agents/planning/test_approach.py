@@ -12,17 +12,17 @@ from elbow_gym.kinematics import hand_position, inverse_kinematics, on_table
 PERIOD = 0.02
 
 
-def still(q, hand, velocity=(0.0, 0.0, 0.0)):
+def still(inverse, q, hand, velocity=(0.0, 0.0, 0.0)):
     """A view of an arm at rest and a target that stays where it is."""
     state = {"q": q, "q_dot": np.zeros(10), "current": np.zeros(10)}
-    return View(state, 0.0, np.tile(hand, (50, 1)), np.tile(velocity, (50, 1)))
+    return View(state, 0.0, np.tile(hand, (50, 1)), np.tile(velocity, (50, 1)), inverse)
 
 
 def test_an_arm_at_rest_on_a_resting_target_is_held():
     arm = paper_arm()
     inverse, base = InverseDynamics(arm, (4, 7)), on_table(arm, arm.nominal_pose, (4, 7))
     q = inverse_kinematics(arm, base, np.array([1.5, 1.5, 0.4]))[0]
-    found = approaches(inverse, still(q, hand_position(arm, q)), q, 12, PERIOD)
+    found = approaches(still(inverse, q, hand_position(arm, q)), q, 12, PERIOD)
     assert found.shape == (len(ARRIVALS), 12, 10)
     hold = inverse.resistance * inverse.hold(q).current
     np.testing.assert_allclose(found, np.broadcast_to(hold, found.shape), rtol=0.0, atol=1e-9)
@@ -45,7 +45,7 @@ def test_motion_starts_as_the_arm_moves_and_joins_the_path():
 
 def test_there_is_no_approach_to_what_is_out_of_reach():
     q = np.array(paper_arm().nominal_pose)
-    found = approaches(InverseDynamics(paper_arm()), still(q, np.array([9.0, 0.0, 0.4])), q, 12, PERIOD)
+    found = approaches(still(InverseDynamics(paper_arm()), q, np.array([9.0, 0.0, 0.4])), q, 12, PERIOD)
     assert found.shape == (0, 12, 10)
 
 
@@ -55,11 +55,11 @@ def test_idle_joints_go_back_to_the_start_pose_where_the_path_is_out_of_their_re
     pose = np.array(arm.nominal_pose)
     folded = pose.copy()
     folded[2] += 1.5 + 0.1 * angle
-    view = still(folded, np.array([1.5, 1.5, 0.4]))
+    inverse = InverseDynamics(arm)
+    view = still(inverse, folded, np.array([1.5, 1.5, 0.4]))
     with pytest.raises(ValueError, match="position must be within reach"):
         inverse_kinematics(arm, folded, view.target[0])
-    inverse = InverseDynamics(arm)
-    voltage = approaches(inverse, view, pose, 50, PERIOD)[0]
+    voltage = approaches(view, pose, 50, PERIOD)[0]
     # Behind the arrival the arm rests in the start pose with its hand on the target.
     hold = inverse.resistance * inverse.hold(inverse_kinematics(arm, pose, view.target[0])[0]).current
     np.testing.assert_allclose(voltage[20:], np.broadcast_to(hold, (30, 10)), rtol=0.0, atol=1e-9)

@@ -45,12 +45,12 @@ def test_a_hand_that_keeps_up_with_the_target_is_on_it():
 @pytest.mark.parametrize("count", ELBOWS)
 def test_the_programs_form_is_the_same_cost_and_its_derivatives_are_its_own(count):
     ca = pytest.importorskip("casadi")
-    inverse, rng = InverseDynamics(paper_arm(), ELBOWS[count]), np.random.default_rng(2)
+    inverse, rng = InverseDynamics(paper_arm(), ELBOWS[count], 0.2), np.random.default_rng(2)
     tail, size = Tail(inverse, 0.02, 0.5, 0.05), 42
     written = tail.written(size)
     z = np.concatenate([pose(ELBOWS[count]), rng.normal(size=size - 10)])
     target, velocity = rng.normal(size=3), rng.normal(size=3)
-    rest = (target, velocity, 0.0, 1.5, 0.002)
+    rest = (target, velocity, 0.0, 1.5, 0.002, 0.2)
     expected = tail.cost(z[:10], z[10:20], target, velocity, 1.5, 0.002)
     assert float(written.cost(z, *rest)) == pytest.approx(float(expected), rel=1e-12)
     along, step = rng.normal(size=size), 1e-6
