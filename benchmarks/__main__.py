@@ -94,7 +94,11 @@ def optimal(
 
 @app.command
 def planners(
-    output: Path = LATEST, drawn: Count = 10, elbows: int = 2, solve: bool = False, publish: bool = False
+    output: Path = LATEST,
+    drawn: Count = 10,
+    elbows: tuple[int, ...] = (2,),
+    solve: bool = False,
+    publish: bool = False,
 ) -> None:
     """Receding-horizon and sampling control beside PPO, computed torque and the bound, also on tasks drawn at random.
 
@@ -102,8 +106,8 @@ def planners(
 
     Args:
         output: Folder for the table.
-        drawn: Number of drawn tasks: circles, loads and starts.
-        elbows: Elbows on the table in the drawn tasks, 0, 1 or 2.
+        drawn: Number of drawn tasks at each elbow count: circles, loads and starts.
+        elbows: Elbows on the table in the drawn tasks, of 0, 1 and 2.
         solve: Whether to seek the bounds of drawn tasks that are not stored; otherwise they are left out.
         publish: Whether to write the results to benchmarks/results and the table into the README.
     """

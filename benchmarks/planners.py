@@ -35,7 +35,14 @@ from benchmarks.optimal import Cell, cached
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
-PLAYERS = ("receding_horizon", "sampling_mpc", "ppo", "computed_torque")
+PLAYERS = (
+    "receding_horizon",
+    "receding_horizon_payload",
+    "sampling_mpc",
+    "sampling_mpc_payload",
+    "ppo",
+    "computed_torque",
+)
 """Players of the table."""
 SEED = 26
 """Seed of the drawn tasks."""
@@ -177,14 +184,19 @@ def _played(task: Task, name: str, folder: Path, tell: Tell) -> dict[str, float]
 
 
 def planners(
-    output: Path, drawn: int, elbows: int, solve: bool = False, publish: bool = False, folder: Path = CACHE
+    output: Path,
+    drawn: int,
+    elbows: Sequence[int],
+    solve: bool = False,
+    publish: bool = False,
+    folder: Path = CACHE,
 ) -> str:
     """Plays `PLAYERS` on the nominal tasks and on drawn ones; writes planners.csv and .md. Returns the table.
 
     Args:
         output: folder of the results, unless they are published.
-        drawn: number of drawn tasks.
-        elbows: elbows of the drawn tasks.
+        drawn: number of drawn tasks at each elbow count.
+        elbows: elbow counts of the drawn tasks.
         solve: whether bounds of drawn tasks that were not sought before are sought now.
         publish: whether the results go to benchmarks/results, and the table into the README.
         folder: folder of what was played before.
@@ -198,8 +210,9 @@ def planners(
         raise ValueError('casadi must be installed for the planners: pip install "elbow-gym[optimal]"')
     output = RESULTS if publish else output
     tasks = [Task(NOMINAL, count, {"start_noise": 0.0}) for count in ELBOW_COUNTS]
-    # A task whose start pose cannot reach its circle is passed over.
-    tasks += playable(drawn_tasks(2 * drawn, elbows), drawn)
+    for count in elbows:
+        # A task whose start pose cannot reach its circle is passed over.
+        tasks += playable(drawn_tasks(2 * drawn, count), drawn)
     players = [find_player(name, count) for name in PLAYERS for count in ELBOW_COUNTS]
     compile_before([*((player.settings, 1) for player in players), *(player.settings for player in players)])
     jobs = {(task, name): Job(partial(_played, task, name, folder), 1) for task in tasks for name in PLAYERS}

@@ -75,7 +75,7 @@ def test_planners_table_is_made_of_its_rows_and_episodes_are_played_once(tmp_pat
 
     monkeypatch.setattr(module, "play", played)
     for _ in range(2):
-        text = planners(tmp_path / "out", 2, 2, folder=tmp_path / "cache")
+        text = planners(tmp_path / "out", 2, (2,), folder=tmp_path / "cache")
     assert counted == [NOMINAL, "0", "1", "1"]
     assert (tmp_path / "out" / "planners.md").read_text() == text
     rows = (tmp_path / "out" / "planners.csv").read_text().splitlines()
