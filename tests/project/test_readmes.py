@@ -14,10 +14,14 @@ import pytest
 
 import elbow_gym
 from agents.__main__ import app as agents_app
+from agents.control.inverse_dynamics import InverseDynamics
+from agents.control.trajectory import Trajectory
 from agents.learning.presets import default_settings
+from agents.shipped import OPTIMA
 from agents.style import CONTROLLER_NAMES
 from benchmarks.__main__ import app as benchmarks_app
 from elbow_gym import ElbowArmEnv
+from elbow_gym.task.settings import Settings
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -318,3 +322,20 @@ def test_space_under_the_table_is_worth_what_the_benchmarks_readme_says():
     )
     for elbows, percent in zip((1, 0), quoted.groups(), strict=True):
         assert round(100.0 * (1.0 - cost[elbows, "True"] / cost[elbows, "False"])) == int(percent)
+
+
+def test_optima_pay_less_than_their_postures_at_rest_and_fold_as_the_benchmarks_readme_says():
+    quoted = re.search(
+        r"pay (\d+) % less with one elbow, and (\d+) % less\s+with none", PAGES["benchmarks/README.md"]
+    ).groups()
+    for elbows, percent in zip((1, 0, 2), (*quoted, None), strict=True):
+        settings = Settings(elbows=elbows)
+        inverse = InverseDynamics(settings.parsed_arm, settings.elbow_joints)
+        optimum = Trajectory.load(OPTIMA / f"elbows{elbows}.npz")
+        moving, resting = (
+            (inverse.resistance * current[101:] ** 2).sum(axis=-1).mean()
+            for current in (optimum.current, inverse.hold(optimum.q).current)
+        )
+        assert percent is None or round(100.0 * (1.0 - moving / resting)) == int(percent)
+        start, folded = (inverse.torque(q, np.zeros(10), np.eye(10)[0])[0] for q in optimum.q[[0, 10]])
+        assert folded < 0.605 * start
