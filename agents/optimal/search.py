@@ -18,7 +18,7 @@ from agents.optimal.certificate import Bound, checked
 from agents.optimal.descent import STAGES, Descended, Descent
 from agents.optimal.guesses import posture_guesses, simulated
 from agents.optimal.problem import Problem
-from agents.optimal.solution import SMOOTHINGS, Point, Progress, Solution, SolveError, solve
+from agents.optimal.solution import LOOSE, SMOOTHINGS, Point, Progress, Solution, SolveError, solve
 from agents.optimal.store import Neighbour, Store
 from agents.planning.collocation import Transcription
 from agents.workers import Job, Tell, compile_before, in_processes
@@ -140,7 +140,7 @@ def certified(
         try:
             further = Descent(problem)(end.trajectory, STAGES[1:])
             say(f"descended to {further.cost:.5g}, {further.depth * 1e3:.2g} mm below the table")
-            followed = solve(program, further.trajectory, SMOOTHINGS, say)
+            followed = solve(program, further.trajectory, SMOOTHINGS, say, tolerance=LOOSE)
             return _finished(program, followed, name, progress, refine, took), followed
         except SolveError as error:
             failures.append(f"{name}: {error}")
@@ -161,7 +161,7 @@ def continued(problem: Problem, near: Neighbour, progress: Progress) -> tuple[Bo
     if near.point is None:
         followed = solve(program, Descent(problem)(near.trajectory, STAGES[1:]).trajectory, SMOOTHINGS, say)
     else:
-        followed = solve(program, near.point, SMOOTHINGS, say, CONTINUED_ITERATIONS, CONTINUED_BARRIER)
+        followed = solve(program, near.point, SMOOTHINGS, say, CONTINUED_ITERATIONS, CONTINUED_BARRIER, LOOSE)
     return _finished(program, followed, NEIGHBOUR, progress, True, took), followed
 
 

@@ -28,10 +28,10 @@ ACCEPTABLE = {
     "acceptable_obj_change_tol": 1e-4,
     "acceptable_iter": 5,
 }
-LOOSE = 1e-2
-"""Tolerance of a solution that is but the next one's guess."""
+LOOSE, TIGHT = 1e-2, 1e-5
+"""Tolerances of a solution that is but the next one's guess, and of the last one."""
 LEAST_BARRIER = 1e-6
-"""Weight of the barrier from which a solve starts at least [cost]."""
+"""Weight of the barrier that a solve starts from at least and ends with [cost]."""
 # As IPOPT's own plan ends, the barrier falls faster than far solutions follow: their steps become tiny.
 BARRIER = {"mu_linear_decrease_factor": 0.3, "mu_superlinear_decrease_power": 1.2}
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
@@ -89,10 +89,12 @@ def solve(
     progress: Progress = lambda _: None,
     max_iter: int = ITERATIONS,
     barrier: float | None = None,
+    tolerance: float = TIGHT,
 ) -> Solution:
     """IPOPT at one smoothing after the other; a smaller one that fails leaves the solution of the one before.
 
-    The barrier falls with the smoothing, to zero at the last one: between them a solution is but the next one's guess.
+    The barrier falls with the smoothing: between them a solution is but the next one's guess. The least one that is
+    left at the last smoothing makes the cost some millionths larger than none would.
 
     Args:
         program: program to solve.
@@ -101,6 +103,7 @@ def solve(
         progress: called with a line on every smoothing.
         max_iter: most iterations at one smoothing.
         barrier: weight of the barrier at the first smoothing [cost]; one that fits the guess when None.
+        tolerance: largest residual of the first-order conditions at the last smoothing.
 
     Raises:
         SolveError: the first smoothing did not converge.
@@ -114,29 +117,29 @@ def solve(
     # What the simulator made is nearly feasible: the barrier need not push it away from its bounds first.
     options = {"bound_push": 1e-4, "bound_frac": 1e-4} if feasible else {}
 
-    def step(smoothing: float, start: float, end: float, **more: float) -> str:
+    def step(smoothing: float, start: float, end: float, tolerance: float, **more: float) -> str:
         nonlocal point, barrier
-        loose = {"mu_target": end, "tol": LOOSE} if end > 0.0 else {}
+        goal = {"mu_target": end, "tol": tolerance}
         x, multipliers, stats = program.solve(
             point.x,
             smoothing,
             point.multipliers,
-            **{**ACCEPTABLE, **BARRIER, "mu_init": start, "max_iter": max_iter, **loose, **more},
+            **{**ACCEPTABLE, **BARRIER, "mu_init": start, "max_iter": max_iter, **goal, **more},
         )
         status = str(stats["return_status"])
         progress(f"smoothing {smoothing * 1e3:g} mm, {stats['iter_count']} iterations: {status}")
         if status in SOLVED:
-            point, barrier = Point(x, multipliers), max(end, LEAST_BARRIER)
+            point, barrier = Point(x, multipliers), end
         return status
 
     reached = None
     for smoothing in smoothings:
-        last = smoothing == smoothings[-1]
-        status = step(smoothing, barrier, 0.0 if last else max(barrier / 10.0, LEAST_BARRIER), **options)
+        end = LEAST_BARRIER if smoothing == smoothings[-1] else max(barrier / 10.0, LEAST_BARRIER)
+        status = step(smoothing, barrier, end, tolerance if smoothing == smoothings[-1] else LOOSE, **options)
         options = {}
         if status not in SOLVED:
             if reached is not None:
-                status = step(reached, barrier, 0.0)
+                status = step(reached, barrier, LEAST_BARRIER, tolerance)
             if status not in SOLVED:
                 raise SolveError(f"IPOPT must converge at a smoothing of {reached or smoothing} m, got {status}")
             break

