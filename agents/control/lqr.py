@@ -17,7 +17,7 @@ from elbow_gym.task.settings import Settings
 Array = NDArray[np.float64]
 
 STEP = 1e-5
-"""Half the step of the central differences [rad, rad/s, A, V]."""
+"""Step of the differences to each side [rad, rad/s, A, V]."""
 SMOOTHING = 0.002
 """Length that smooths the tracking error e to sqrt(e^2 + SMOOTHING^2) [m], whose curvature is finite on the target."""
 STIFFNESS = 1e-3
@@ -67,17 +67,19 @@ class TimeVaryingLQR:
 
 
 class Linearisation:
-    """Slopes of a control period by central differences of the simulator, all periods of a trajectory in one batch.
+    """Slopes of a control period by differences of the simulator, all periods of a trajectory in one batch.
 
     Args:
         settings: the environment.
         periods: control periods of the trajectories.
+        central: whether differences go to both sides, in twice the time.
     """
 
-    def __init__(self, settings: Settings, periods: int) -> None:
+    def __init__(self, settings: Settings, periods: int, central: bool = True) -> None:
         arm, self._steps, n = settings.parsed_arm, settings.substeps, settings.parsed_arm.n_joints
         self._n, self._periods, self._together = n, periods, min(periods, TOGETHER)
-        self._nudge = np.concatenate([np.eye(4 * n), -np.eye(4 * n)]) * STEP
+        self._apart = (2.0 if central else 1.0) * STEP
+        self._nudge = np.concatenate([np.eye(4 * n), -np.eye(4 * n) if central else np.zeros((1, 4 * n))]) * STEP
         self._simulator = Simulator(
             arm,
             settings.elbow_joints,
@@ -102,7 +104,7 @@ class Linearisation:
         for first in (*range(0, self._periods - self._together, self._together), self._periods - self._together):
             chosen = slice(first, first + self._together)
             after = self._after(states[chosen], voltage[chosen])
-            slopes[chosen] = np.swapaxes(after[:, :size] - after[:, size:], 1, 2) / (2.0 * STEP)
+            slopes[chosen] = np.swapaxes(after[:, :size] - after[:, size:], 1, 2) / self._apart
         return slopes[..., : 3 * n], slopes[..., 3 * n :]
 
     def _after(self, states: Array, voltage: Array) -> Array:

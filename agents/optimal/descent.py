@@ -63,7 +63,7 @@ class Descent:
         settings = problem.settings
         arm, n = settings.parsed_arm, settings.parsed_arm.n_joints
         self._problem, self._settings, self._n = problem, settings, n
-        self._power, self._linearised = MeanPower(settings), Linearisation(settings, settings.horizon)
+        self._power, self._linearised = MeanPower(settings), Linearisation(settings, settings.horizon, central=False)
         self._inverse = InverseDynamics(arm, settings.elbow_joints, settings.payload)
         # Number n + 1 is the hand.
         self._above = [j for j in range(3, n + 2) if j not in settings.elbow_joints] if problem.above_table else []
