@@ -1,5 +1,6 @@
 """Configuration of all tests: hypothesis's profile, windows that nobody sees, one thread, markers, kernels, the arm."""
 
+import gc
 import os
 import signal
 
@@ -14,6 +15,8 @@ from elbow_gym import paper_arm, simulator
 from elbow_gym.kernel.build import kernel
 from tests.support.kernel_calls import shared
 
+# What is imported while tests are collected is no garbage. Looking through it would take 3 % of the time of them all.
+gc.disable()
 settings.register_profile(
     "elbow_gym",
     derandomize=True,
@@ -31,6 +34,12 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.get_closest_marker("soak") or item.get_closest_marker("timing"):
             item.add_marker("slow")
+
+
+def pytest_collection_finish():
+    """Starts to look for garbage, but in what comes from now on."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl(tryfirst=True)

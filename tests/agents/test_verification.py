@@ -2,11 +2,14 @@
 
 import json
 import shutil
+from functools import cache
 
 import pytest
 
 from agents import verification
 from agents.__main__ import app
+from agents.evaluation.receipt import player_again
+from agents.evaluation.regimes import in_all_regimes
 from agents.shipped import CURVES, RECEIPTS
 from agents.verification import joules_again, shipped_policies
 from elbow_gym.baselines.policy import BASELINES
@@ -90,7 +93,10 @@ def test_policy_that_is_there_twice_is_named(copy):
 
 
 @pytest.mark.slow
-def test_joules_of_the_pd_are_those_of_its_receipt_and_other_ones_are_named(tmp_path):
+def test_joules_of_the_pd_are_those_of_its_receipt_and_other_ones_are_named(tmp_path, monkeypatch):
+    # Both receipts are of one player and seed.
+    played = cache(lambda *_: in_all_regimes(player_again(given), given["seeds"]))
+    monkeypatch.setattr("agents.evaluation.receipt.in_all_regimes", lambda *_: played())
     given = json.loads((RECEIPTS / "pd_elbows2.json").read_text()) | {"code": "another", "seeds": [20_000]}
     given["joules"] = {regime: values[:1] for regime, values in given["joules"].items()}
     path = tmp_path / "pd.json"

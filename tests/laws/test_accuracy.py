@@ -74,13 +74,15 @@ SAMPLE = (
     "uniform, rough",
 )
 """Cases that have what all have: elbows and none, voltages that jump, a table that rubs, every switch at once."""
-NAMES = [pytest.param(name, marks=() if name in SAMPLE else pytest.mark.soak) for name in CASES]
+HALVES = [pytest.param(name, 2.5, id=f"{name}, half an episode") for name in SAMPLE]
+WHOLE = [pytest.param(name, 5.0, id=name, marks=pytest.mark.soak) for name in CASES]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
-def test_default_steps_agree_with_steps_of_a_twentieth_of_a_millisecond(name):
+@pytest.mark.parametrize(("name", "duration"), [*HALVES, *WHOLE])
+def test_default_steps_agree_with_steps_of_a_twentieth_of_a_millisecond(name, duration):
     arguments, act, *bounds = CASES[name]
+    arguments = {**arguments, "duration": duration}
     coarse, fine, default = (play(arguments, act, substeps) for substeps in (200, 400, None))
     agree = (np.abs(coarse / fine - 1.0)[:2] < 5e-3).all(axis=0)
     assert agree.sum() >= 8

@@ -1,5 +1,9 @@
-"""Hypothesis strategies: random arms of the family, their states and the elbows they can have."""
+"""Hypothesis strategies: random arms of the family, their states and the elbows they can have.
 
+Each is made once: a new one is checked at its first draw, which takes longer than the draw.
+"""
+
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -19,14 +23,20 @@ class Case(NamedTuple):
     elbows: tuple[int, ...]
 
 
+integers = cache(st.integers)
+
+
+@cache
 def between(low, high):
     return st.floats(low, high, allow_subnormal=False)
 
 
+@cache
 def vectors(n, bound):
-    return st.lists(between(-bound, bound), min_size=n, max_size=n).map(np.array)
+    return st.tuples(*[between(-bound, bound)] * n).map(np.array)
 
 
+@cache
 @st.composite
 def links(draw, base=False):
     return LinkParameters(
@@ -36,6 +46,7 @@ def links(draw, base=False):
     )
 
 
+@cache
 @st.composite
 def motors(draw):
     return MotorParameters(
@@ -48,9 +59,10 @@ def motors(draw):
     )
 
 
+@cache
 @st.composite
 def arms(draw, smallest=3, largest=14):
-    n = draw(st.integers(smallest, largest))
+    n = draw(integers(smallest, largest))
     return ArmParameters(
         links=(draw(links(base=True)), *(draw(links()) for _ in range(n - 1))),
         motors=tuple(draw(motors()) for _ in range(n)),
@@ -60,11 +72,13 @@ def arms(draw, smallest=3, largest=14):
     )
 
 
-def elbow_tuples(arm, most=4):
+@cache
+def elbow_tuples(n, most=4):
     """Up to `most` distinct joints from 3 on, in order."""
-    return st.sets(st.integers(3, arm.n_joints), max_size=min(most, arm.n_joints - 2)).map(lambda e: tuple(sorted(e)))
+    return st.sets(integers(3, n), max_size=min(most, n - 2)).map(lambda e: tuple(sorted(e)))
 
 
+@cache
 @st.composite
 def cases(draw, smallest=3, largest=14):
     """An arm and a state that need not hold its elbows on the table."""
@@ -76,5 +90,5 @@ def cases(draw, smallest=3, largest=14):
         q_dot=draw(vectors(n, 5.0)),
         current=draw(vectors(n, 10.0)),
         voltage=draw(vectors(n, 24.0)),
-        elbows=draw(elbow_tuples(arm)),
+        elbows=draw(elbow_tuples(n)),
     )

@@ -38,6 +38,7 @@ def test_command_prints_the_certificate_and_writes_the_trajectory(tmp_path, monk
         return found[0]
 
     monkeypatch.setattr(command, "bound", here)
+    monkeypatch.setattr("agents.optimal.guesses.SEARCHES", 2)
     output = tmp_path / "optimum.npz"
     settings = settings_of((2,), (1.0, 0.001), None, {"duration": 0.1, "start": "on_target"})
     solve_and_print(settings, above_table=None, fresh=False, output=output)

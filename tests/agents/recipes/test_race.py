@@ -20,9 +20,16 @@ def shipped(observation):
     return load_policy("ppo", elbows=2).predict(observation)[0]
 
 
+@pytest.fixture(scope="module")
+def pd():
+    """The PD's metrics, which take a second."""
+    return race.Race().pd
+
+
 @pytest.mark.slow
-def test_shipped_policy_beats_the_pd_and_an_idle_arm_does_not():
+def test_shipped_policy_beats_the_pd_and_an_idle_arm_does_not(pd):
     found = race.Race(every=100)
+    found.pd = pd
     assert not found(100, idle)
     assert found.beaten is None
     assert found(250, shipped)
@@ -68,9 +75,13 @@ def test_an_actor_that_breaks_the_simulation_has_lost_and_training_goes_on(monke
     assert found.marks[0].figures.keys() == load_policy("ppo", elbows=2).card.evaluation.keys() - {"seeds"}
 
 
-def test_training_goes_on_after_the_pd_is_beaten_when_it_is_to():
-    found = race.Race(every=1, stop=False)
-    assert not found(1, shipped)
+@pytest.mark.parametrize("stop", [True, False])
+def test_training_goes_on_after_the_pd_is_beaten_when_it_is_to(monkeypatch, stop):
+    monkeypatch.setattr(race, "controller_evaluation", lambda *_: dict.fromkeys(race.LOST, 1.0))
+    found = race.Race(every=1, stop=stop)
+    found.pd = {"electrical_energy": 2.0, "steady_error_rms_mm": 2.0}
+    assert found(1, idle) is stop
+    assert found.beaten is found.marks[0]
 
 
 def test_race_refuses_an_interval_that_is_not_positive():
@@ -79,9 +90,8 @@ def test_race_refuses_an_interval_that_is_not_positive():
 
 
 @pytest.mark.slow
-def test_pd_of_the_race_is_the_energy_benchmarks_within_the_spread_of_the_seeds():
+def test_pd_of_the_race_is_the_energy_benchmarks_within_the_spread_of_the_seeds(pd):
     with (RESULTS / "energy.csv").open(encoding="utf-8") as handle:
         rows = {(r["controller"], r["elbows"], r["regime"]): r for r in csv.DictReader(handle)}
-    pd = race.Race().pd
     assert pd["electrical_energy"] == pytest.approx(float(rows["pd", "2", "A"]["electrical_energy [J]"]), rel=0.05)
     assert pd["steady_error_rms_mm"] == pytest.approx(float(rows["pd", "2", "B"]["error_rms [mm]"]), rel=0.01)
