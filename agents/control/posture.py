@@ -147,9 +147,11 @@ def best_postures(
                     options={"maxiter": 300, "ftol": 1e-6},
                 )
             met = all((c["fun"](best.x) > -1e-6).all() for c in conditions) and (np.abs(held(best.x)) < 1e-6).all()
-            if met:
-                pose = inverse_kinematics(arm, poses(best.x)[0], start)[0]
-                found.append(Posture(pose, float(best.fun)))
+            # A last joint bent by a whole turn is stretched, and rounding can put the hand out of its reach.
+            with suppress(ValueError):
+                if met:
+                    pose = inverse_kinematics(arm, poses(best.x)[0], start)[0]
+                    found.append(Posture(pose, float(best.fun)))
         return found
 
     found = searched(again=False) or searched(again=True)

@@ -1,10 +1,13 @@
 """Slopes of the posture's search are those of the functions, and its steps stay within the bounds."""
 
+import math
+
 import numpy as np
 import pytest
 
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.posture import LARGEST, best_postures, leads_to, slopes
+from elbow_gym import Circle, paper_arm
 from elbow_gym.kinematics import elbow_heights, inverse_kinematics, on_table, pitches
 from elbow_gym.task.default_circle import default_circle
 from tests.support.arms import shortened, six_joint_arm
@@ -68,3 +71,12 @@ def test_a_posture_is_found_where_joint_n_minus_1_comes_to_half_a_turn_on_its_wa
     best = best_postures(arm, (4,), circle, starts=2)[0]
     np.testing.assert_allclose(elbow_heights(arm, best.pose, (4,)), 0.0, atol=1e-5)
     assert leads_to(arm, (4,), best.pose)
+
+
+def test_a_search_that_ends_stretched_after_a_whole_turn_of_the_last_joint_is_left_out():
+    # The search from the third start ends there, a rounding out of reach; the others find the posture.
+    center = (1.4966571344652544, 1.351089504494192, 0.46597322095313176)
+    radius, tilt, axis = 0.10114392536810793 / math.cos(math.pi / 8.0), 0.7199748348679174, 2.465207290768988
+    circle = Circle(center=center, radius=radius, tilt=tilt, tilt_axis=axis)
+    found = best_postures(paper_arm(), (4, 7), circle, starts=3, payload=0.12094408830556702)
+    assert found[0].copper_loss < 50.0
