@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +37,24 @@ def task_settings(env: str, elbows: Elbows | None = None, more: Mapping[str, Any
 
     chosen = {} if elbows is None else {"elbows": elbows}
     return Settings(**{**registered_arguments(env), **chosen, **(more or {})})
+
+
+def settings_of_task(elbows: Elbows, task: Mapping[str, Any]) -> Settings:
+    """`Settings` of one task of `ElbowArmTasks-v0`, with nothing drawn, as a planner or a bound needs it.
+
+    Its episode is the one that `task` sets; the start pose is the arm's nominal one, and the task is not observed.
+
+    Args:
+        elbows: elbows on the table.
+        task: options of a reset, as `elbow_gym.evaluation_tasks` has them: `circle` with all that is drawn, `state`
+            with q [rad], and `parameters` with the payload [kg].
+    """
+    from elbow_gym.parameters import paper_arm
+    from elbow_gym.task.settings import Settings
+
+    arm = replace(paper_arm(), nominal_pose=tuple(task["state"]["q"]))
+    load = task["parameters"]["payload"]
+    return Settings(elbows=elbows, arm=arm, circle=task["circle"], payload=load, start_noise=0.0)
 
 
 def plain_arguments(settings: Settings) -> dict[str, Any]:
