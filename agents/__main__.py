@@ -133,7 +133,7 @@ def bound(
         environment: Other arguments of the environment, such as "arm", "duration" or "voltage_limit".
         under_table: Whether joints may go below z = 0; only with two or more elbows, where they hardly do, when None.
         fresh: Whether it is solved again, and from postures; the better solution is kept.
-        starts: Number of postures that a task from scratch is started from; the cheapest descent is followed.
+        starts: Number of postures that a task from scratch is started from; more than two are all followed to the end.
         output: File for the trajectory, .npz.
     """
     from agents.optimal.command import settings_of, solve_and_print

@@ -40,18 +40,16 @@ class MeanPower:
         return (self.price * voltage * (voltage - change)).sum(axis=(-2, -1))
 
     def slopes(self, a: Array, b: Array, voltage: Array, change: Array) -> tuple[Array, Array]:
-        """Slopes in v, (n,), and in x, (3n,), of a period x -> a x + b v that changes the state by `change`, (3n,)."""
-        paid = self.change.T @ (self.price * voltage)
-        return (
-            self.price * (2.0 * voltage - self.change @ change) - b.T @ paid,
-            -(a - np.eye(len(a))).T @ paid,
-        )
+        """Slopes in v, (..., n), and in x, (..., 3n), of periods x -> a x + b v with changes of x, (..., 3n)."""
+        paid = (self.price * voltage) @ self.change
+        in_x = paid - np.einsum("...ij,...i->...j", a, paid)
+        return self.price * (2.0 * voltage - change @ self.change.T) - np.einsum("...ij,...i->...j", b, paid), in_x
 
     def curvatures(self, a: Array, b: Array) -> tuple[Array, Array]:
-        """Second derivatives in v and v, (n, n), and in v and x, (n, 3n), of a period x -> a x + b v."""
+        """Second derivatives in v and v, (..., n, n), and in v and x, (..., n, 3n), of periods x -> a x + b v."""
         price = self.price[:, None]
         effort = price * (np.eye(len(price)) - self.change @ b)
-        return effort + effort.T, -price * (self.change @ (a - np.eye(len(a))))
+        return effort + np.swapaxes(effort, -1, -2), -price * (self.change @ a - self.change)
 
 
 def hand_jacobian(arm: ArmParameters, q: Array) -> Array:
@@ -117,32 +115,43 @@ def riccati(
     periods, size, n = B.shape
     steps, gains = np.zeros((periods, n)), np.zeros((periods, n, size))
     linear, value = np.zeros(size), np.zeros((size, size))
+    efforts, crosses = power.curvatures(A, B)
+    if planned is not None:
+        pulls, drifts = power.slopes(A, B, planned[1], np.diff(planned[0], axis=0))
     for k in range(periods - 1, -1, -1):
         a, b = A[k], B[k]
         value[:n, :n] += curvature[k]
-        effort, cross = power.curvatures(a, b)
-        effort = effort + b.T @ value @ b
-        cross = cross + b.T @ value @ a
-        free = np.ones(n, dtype=bool)
+        ahead = b.T @ value
+        effort, cross = efforts[k] + ahead @ b, crosses[k] + ahead @ a
         if planned is None or slope is None:
             gains[k] = np.linalg.solve(effort, cross)
         else:
-            states, voltage = planned
             linear[:n] += slope[k]
-            pull, drift = power.slopes(a, b, voltage[k], states[k + 1] - states[k])
-            pull, drift = pull + b.T @ linear, drift + a.T @ linear
-            room = -limit - voltage[k], limit - voltage[k]
-            steps[k], free = _bounded(effort + stiffness * np.eye(n), pull, *room)
-            if free.any():
-                among = np.ix_(free, free)
-                np.linalg.cholesky((effort + stiffness * np.eye(n))[among])
-                gains[k, free] = np.linalg.solve((effort + stiffness * np.eye(n))[among], cross[free])
-            paid = effort @ steps[k]
-            linear = drift - gains[k].T @ (paid + pull) + cross.T @ steps[k]
+            pull, drift = pulls[k] + b.T @ linear, drifts[k] + a.T @ linear
+            room = -limit - planned[1][k], limit - planned[1][k]
+            steps[k], gains[k] = _bounded_law(effort + stiffness * np.eye(n), pull, cross, *room)
+            linear = drift - gains[k].T @ (effort @ steps[k] + pull) + cross.T @ steps[k]
         mixed = cross.T @ gains[k]
         value = a.T @ value @ a + gains[k].T @ effort @ gains[k] - mixed - mixed.T
         value = (value + value.T) / 2.0
     return steps, gains
+
+
+def _bounded_law(effort: Array, pull: Array, cross: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """The step u of least pull u + u effort u / 2 in low <= u <= high, and the gains of what is not held at a bound.
+
+    Raises LinAlgError where there is no least one.
+    """
+    np.linalg.cholesky(effort)
+    free_law = np.linalg.solve(effort, np.column_stack([pull, cross]))
+    step, gain = -free_law[:, 0], free_law[:, 1:]
+    if ((low <= step) & (step <= high)).all():
+        return step, gain
+    step, free = _bounded(effort, pull, low, high)
+    gain = np.zeros_like(cross)
+    if free.any():
+        gain[free] = np.linalg.solve(effort[np.ix_(free, free)], cross[free])
+    return step, gain
 
 
 def _bounded(effort: Array, pull: Array, low: Array, high: Array) -> tuple[Array, NDArray[np.bool_]]:

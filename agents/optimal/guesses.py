@@ -15,7 +15,7 @@ from agents.control.posture import best_postures
 from agents.control.trajectory import Trajectory
 from agents.evaluation.recording import Recording, record
 from agents.optimal.problem import Problem
-from elbow_gym.kinematics import inverse_kinematics, on_table
+from elbow_gym.kinematics import inverse_kinematics, nearest_turn, on_table
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -80,6 +80,10 @@ def _motion(problem: Problem, pose: Array) -> Trajectory | None:
         q_d, q_d_dot = inverse_kinematics(settings.parsed_arm, pose, circle.position(angle), circle.velocity(angle))
     except ValueError:
         return None
+    # Each from the one before it: taken one by one, joints 1 and n-1 may come with another turn.
+    before = problem.start
+    for k, wanted in enumerate(q_d):
+        q_d[k] = before = nearest_turn(wanted, before)
     q = problem.start + grown[:, None] * (q_d - problem.start)
     q_dot = rate[:, None] / REACH_TIME * (q_d - problem.start) + grown[:, None] * q_d_dot
     return Trajectory(q, q_dot, np.zeros_like(q), np.zeros_like(q[1:]))

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import islice
+from typing import TypeVar
 
 from agents.control.trajectory import Trajectory
 from agents.optimal.certificate import Bound, checked
@@ -24,8 +25,12 @@ from agents.planning.collocation import Transcription
 from agents.workers import Job, Tell, compile_before, in_processes
 from elbow_gym.task.settings import Settings
 
+Found = TypeVar("Found", Descended, Solution)
+
 COARSE, FINE = 2, 3
 """Numbers of Radau points in a control period, in the search and in the refinement."""
+THOROUGH = 3
+"""Number of starts from which on every one is followed to a solution."""
 FOLLOWED = 2
 """Most descents that are followed to a solution: the second where the first one's program does not converge."""
 NEAR = 1.5
@@ -42,9 +47,7 @@ is the shorter way."""
 def descended(
     problem: Problem, guesses: Mapping[str, Trajectory], progress: Progress, parallel: bool = False
 ) -> tuple[dict[str, Descended], float]:
-    """Ends of the descents from all guesses by name, the cheapest first.
-
-    All go through the first stage, and only the cheapest of them through the others.
+    """Ends of the first stage of the descents from all guesses by name, the cheapest first.
 
     Returns:
         The ends, and the CPU time that other processes took [s].
@@ -52,41 +55,75 @@ def descended(
     Raises:
         SolveError: the simulator can follow no guess.
     """
-    elsewhere = 0.0
-    if parallel and len(guesses) > 1:
-        jobs = {name: Job(partial(_descend_apart, problem, guess), 1) for name, guess in guesses.items()}
-        results = in_processes(jobs, lambda _: None)
-        elsewhere = sum(seconds for _, seconds in results.values())
-        answers = {name: answer for name, (answer, _) in results.items()}
-    else:
-        answers = {name: _descend(problem, guess) for name, guess in guesses.items()}
-    found: dict[str, Descended] = {}
-    for name, answer in answers.items():
-        if isinstance(answer, Descended):
-            progress(f"{name}: descended to {answer.cost:.5g}, {answer.depth * 1e3:.2g} mm below the table")
-            found[name] = answer
-        else:
-            progress(f"{name}: {answer}")
+    found, elsewhere = _of_each(problem, guesses, _descend, progress, parallel)
     if not found:
         raise SolveError(f"the simulator must follow a guess, got none of {sorted(guesses)} that it can")
-    order = sorted(found, key=lambda name: found[name].cost)
-    return {name: found[name] for name in order}, elsewhere
+    return dict(sorted(found.items(), key=lambda item: item[1].cost)), elsewhere
 
 
-def _descend(problem: Problem, guess: Trajectory) -> Descended | str:
-    """The end of the first stage from one guess, or what went wrong."""
+def _descend(problem: Problem, guess: Trajectory, progress: Progress) -> Descended:
+    end = Descent(problem)(guess, STAGES[:1])
+    progress(f"descended to {end.cost:.5g}, {end.depth * 1e3:.2g} mm below the table")
+    return end
+
+
+def _follow(problem: Problem, guess: Trajectory, progress: Progress) -> Solution:
+    """The solution with `COARSE` points from a guess or the end of its first stage."""
+    further = Descent(problem)(guess, STAGES[1:] if guess.voltage.any() else STAGES)
+    progress(f"descended to {further.cost:.5g}, {further.depth * 1e3:.2g} mm below the table")
+    return solve(Transcription(problem, COARSE), further.trajectory, SMOOTHINGS, progress, tolerance=LOOSE)
+
+
+def _of_each(
+    problem: Problem,
+    guesses: Mapping[str, Trajectory],
+    way: Callable[[Problem, Trajectory, Progress], Found],
+    progress: Progress,
+    parallel: bool,
+) -> tuple[dict[str, Found], float]:
+    """Where a way leads from each guess, without those that fail, and the CPU time that other processes took [s]."""
+    elsewhere = 0.0
+    if parallel and len(guesses) > 1:
+        jobs = {name: Job(partial(_apart, way, problem, guess), 1) for name, guess in guesses.items()}
+        results = in_processes(jobs, lambda _: None)
+        elsewhere = sum(seconds for *_, seconds in results.values())
+        answers = {name: answer for name, (answer, _, _) in results.items()}
+        for name, (_, said, _) in results.items():
+            for line in said:
+                progress(f"{name}: {line}")
+    else:
+        answers = {name: _tried(way, problem, guess, partial(_say, progress, name)) for name, guess in guesses.items()}
+    found: dict[str, Found] = {}
+    for name, answer in answers.items():
+        if isinstance(answer, str):
+            progress(f"{name}: {answer}")
+        else:
+            found[name] = answer
+    return found, elsewhere
+
+
+def _tried(
+    way: Callable[[Problem, Trajectory, Progress], Found], problem: Problem, guess: Trajectory, progress: Progress
+) -> Found | str:
+    """Where a way leads from a guess, or why it leads nowhere."""
     try:
-        return Descent(problem)(guess, STAGES[:1])
+        return way(problem, guess, progress)
     except (ArithmeticError, ValueError) as error:
         return str(error)
 
 
-def _descend_apart(problem: Problem, guess: Trajectory, tell: Tell) -> tuple[Descended | str, float]:
-    """`_descend` in a process of its own, and its CPU time [s]."""
-    started = time.process_time()
-    answer = _descend(problem, guess)
+def _apart(
+    way: Callable[[Problem, Trajectory, Progress], Found], problem: Problem, guess: Trajectory, tell: Tell
+) -> tuple[Found | str, list[str], float]:
+    """`_tried` in a process of its own, with what it said and its CPU time [s]."""
+    started, said = time.process_time(), list[str]()
+    answer = _tried(way, problem, guess, said.append)
     tell(1)
-    return answer, time.process_time() - started
+    return answer, said, time.process_time() - started
+
+
+def _say(progress: Progress, name: str, line: str) -> None:
+    progress(f"{name}: {line}")
 
 
 def refined(coarse: Transcription, solution: Solution, progress: Progress) -> tuple[Transcription, Solution]:
@@ -114,6 +151,7 @@ def certified(
     progress: Progress = lambda _: None,
     refine: bool = True,
     parallel: bool = False,
+    thorough: bool = False,
 ) -> tuple[Bound, Solution]:
     """Solves a problem from several guesses, refines the best, plays it in the simulator and checks it.
 
@@ -123,6 +161,8 @@ def certified(
         progress: called with a line on every solve.
         refine: whether the mesh is refined; if not, the simulator's verdict alone is the check.
         parallel: whether every guess is followed in a process of its own.
+        thorough: whether every guess is followed to a solution, of which the cheapest is taken. Otherwise that goes for
+            the guess alone with the cheapest descent, which need not lead to the cheapest solution.
 
     Returns:
         The bound, and the solution with `COARSE` points.
@@ -131,25 +171,22 @@ def certified(
         SolveError: no guess converged, or a check failed, which is named.
     """
     took = _stopwatch()
-    ends, elsewhere = descended(problem, guesses, progress, parallel)
-    took = partial(took, elsewhere)
     program = Transcription(problem, COARSE)
+    if thorough:
+        solutions, elsewhere = _of_each(problem, guesses, _follow, progress, parallel)
+        if not solutions:
+            raise SolveError(f"a guess must lead to a solution, got none of {sorted(guesses)} that does")
+        name, best = min(solutions.items(), key=lambda item: item[1].cost)
+        return _finished(program, best, name, progress, refine, partial(took, elsewhere)), best
+    ends, elsewhere = descended(problem, guesses, progress, parallel)
     failures: list[str] = []
     for name, end in islice(ends.items(), FOLLOWED):
-        say = partial(_say, progress, name)
-        try:
-            further = Descent(problem)(end.trajectory, STAGES[1:])
-            say(f"descended to {further.cost:.5g}, {further.depth * 1e3:.2g} mm below the table")
-            followed = solve(program, further.trajectory, SMOOTHINGS, say, tolerance=LOOSE)
-            return _finished(program, followed, name, progress, refine, took), followed
-        except SolveError as error:
-            failures.append(f"{name}: {error}")
-            progress(failures[-1])
+        followed = _tried(_follow, problem, end.trajectory, partial(_say, progress, name))
+        if isinstance(followed, Solution):
+            return _finished(program, followed, name, progress, refine, partial(took, elsewhere)), followed
+        failures.append(f"{name}: {followed}")
+        progress(failures[-1])
     raise SolveError(f"a guess must lead to a solution, got {'; '.join(failures)}")
-
-
-def _say(progress: Progress, name: str, line: str) -> None:
-    progress(f"{name}: {line}")
 
 
 def continued(problem: Problem, near: Neighbour, progress: Progress) -> tuple[Bound, Solution]:
@@ -208,7 +245,8 @@ def bound(
         settings: arguments of the environment, without contact, friction, heat, supply resistance and randomisation.
         above_table: whether joints 3..n and the hand must have z >= 0; where there are fewer than two elbows if None.
         fresh: whether it is solved again, and from the postures; the cheaper solution stays in the store.
-        starts: number of postures that a task from scratch is started from; the cheapest descent is followed.
+        starts: number of postures that a task from scratch is started from. Of two the cheaper descent is followed to a
+            solution, of more all are, and the cheapest solution is taken.
         parallel: whether the postures are followed in processes of their own; a script then needs its
             `if __name__ == "__main__":`.
         progress: called with a line on every solve.
@@ -238,7 +276,8 @@ def bound(
             except ArithmeticError as error:
                 progress(f"{NEIGHBOUR}: {error}")
     if found is None:
-        found = certified(problem, {**posture_guesses(problem, starts), **guesses}, progress, parallel=parallel)
+        guesses = {**posture_guesses(problem, starts), **guesses}
+        found = certified(problem, guesses, progress, parallel=parallel, thorough=starts >= THOROUGH)
     answer, coarse = found
     if known is not None and known.cost <= answer.cost:
         return known

@@ -68,7 +68,8 @@ class Retaking(Readings):
     def _watch(self, chosen: NDArray[np.bool_]) -> None:
         """Has the balance checked of those chosen arms that move, or whose currents are `LASTING`."""
         motion = np.zeros(int(chosen.sum()))
-        if self._state[chosen, 1:3].any():
+        # What has no control periods takes none again.
+        if self.period > 0.0 and self._state[chosen, 1:3].any():
             motion = np.nan_to_num(stored(self._state, self._parameters).motion[chosen])
         resistance, inverse = (self._parameters[chosen, row] for row in DECAY)
         lasting = (resistance * inverse).min(axis=1) * LASTING < 1.0

@@ -25,6 +25,10 @@ def test_linearised_period_predicts_the_simulators_next_state(arm, elbows, paylo
     after = np.concatenate([simulator.q, simulator.q_dot, simulator.current], axis=-1)
     deviation = np.concatenate([poses[1] - poses[0], np.zeros(10), current])
     np.testing.assert_allclose(A[0] @ deviation + B[0] @ voltage, after[1] - after[0], atol=2e-5)
+    one_sided = Linearisation(settings, 5, central=False)(trajectory.states[:-1], trajectory.voltage)
+    np.testing.assert_allclose(
+        np.concatenate(one_sided, axis=-1), np.concatenate([A, B], axis=-1), rtol=1e-3, atol=1e-3
+    )
 
 
 def test_lqr_without_a_deviation_gives_the_planned_voltage(arm):

@@ -1,5 +1,8 @@
 """`bound` on a short episode: from scratch, from the store, from a task nearby, and what it says when a check fails."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -13,7 +16,7 @@ from agents.optimal.problem import Problem
 from agents.optimal.solution import SolveError
 from agents.optimal.store import Store
 from elbow_gym import paper_arm
-from elbow_gym.kinematics import elbow_heights
+from elbow_gym.kinematics import elbow_heights, hand_position
 from elbow_gym.task.circle import Circle
 from elbow_gym.task.settings import Settings
 
@@ -116,6 +119,38 @@ def test_more_starts_are_different_motions_from_the_same_start(monkeypatch):
     apart = np.abs(ends[:, None] - ends).max(axis=-1)[~np.eye(6, dtype=bool)]
     assert apart.min() > 1e-3
     np.testing.assert_allclose([guess.q[0] for guess in found.values()], np.tile(problem.start, (6, 1)))
+
+
+def test_a_guess_goes_on_where_the_last_links_come_to_half_a_turn_from_the_start(monkeypatch):
+    monkeypatch.setattr(guesses, "best_postures", lambda *_, **__: [])
+    nominal = np.array(paper_arm().nominal_pose)
+    path = posture_guesses(Problem(Settings(elbows=0), above_table=True))["paper posture"].q[:, -2]
+    # The path's mean is half a turn away, so that it crosses the place where the nearest angle has another turn.
+    nominal[-2] = path[100:].mean() - np.pi
+    settings = Settings(elbows=0, arm=replace(paper_arm(), nominal_pose=tuple(nominal)))
+    guess = posture_guesses(Problem(settings))["paper posture"]
+    assert np.abs(np.diff(guess.q, axis=0)).max() < 0.3
+    end = Problem(settings).target[-1]
+    np.testing.assert_allclose(hand_position(settings.parsed_arm, guess.q[-1]), end, atol=1e-9)
+
+
+def test_of_many_starts_each_is_followed_and_the_cheapest_solution_taken(monkeypatch):
+    costs = {"dear": 3.0, "cheap": 1.0, "astray": np.nan, "fair": 2.0}
+
+    def follow(_problem, guess, _progress):
+        if np.isnan(costs[guess]):
+            raise SolveError("astray")
+        return SimpleNamespace(cost=costs[guess])
+
+    monkeypatch.setattr(search, "Transcription", lambda *_: None)
+    monkeypatch.setattr(search, "_follow", follow)
+    monkeypatch.setattr(search, "_finished", lambda _program, coarse, name, *_: (name, coarse.cost))
+    said = []
+    found, _ = search.certified(None, {name: name for name in costs}, said.append, thorough=True)
+    assert found == ("cheap", 1.0)
+    assert said == ["astray: astray"]
+    with pytest.raises(SolveError, match=r"a guess must lead to a solution, got none of \['astray'\]"):
+        search.certified(None, {"astray": "astray"}, thorough=True)
 
 
 def test_shipped_optima_are_solved_tasks_to_start_from(tmp_path):
