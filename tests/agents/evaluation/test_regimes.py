@@ -67,14 +67,13 @@ def test_regimes_are_counted_from_the_episodes_of_their_start():
     assert list(in_all_regimes(player, SEEDS, regimes=REGIMES[:1])) == ["A"]
 
 
-@pytest.mark.slow
 def test_bar_of_the_command_ends_at_100_percent_and_shows_no_other(monkeypatch, capsys):
     def play(player, seeds, progress):
         for done in (0, 125, 250, 500):
             progress(done, 500)
 
-    monkeypatch.setattr("agents.evaluation.regimes.in_all_regimes", play)
-    monkeypatch.setattr("agents.evaluation.regimes.print_results", lambda *_: None)
+    monkeypatch.setattr("agents.evaluation.command.in_all_regimes", play)
+    monkeypatch.setattr("agents.evaluation.command.print_results", lambda *_: None)
     app.run(["evaluate", "pd", "--episodes", "1"])
     percents = [int(percent) for percent in re.findall(r"(\d+)%", capsys.readouterr().err)]
     assert percents[-1] == max(percents) == 100
