@@ -222,12 +222,15 @@ def assert_drawn_in_three_colours(path):
 
 
 def draw_chosen(folder, monkeypatch, chosen):
-    """Draws figures of made-up runs into a folder: those that are chosen, by name; other courses are not even made."""
-    every, course = figures.figures, figures._course
+    """Draws figures of made-up runs into a folder: those that are chosen, by name; most others are not even made."""
+    every, course, trajectories = figures.figures, figures._course, figures._trajectories
 
     def made(cases, title, *arguments, **how):
         name = f"fig{int(title.removeprefix('Fig. ').split(':')[0]):02d}"
         return course(cases, title, *arguments, **how) if name in chosen else None
+
+    def seen(cases, number, axes):
+        return trajectories(cases, number, axes) if f"fig{number:02d}" in chosen else None
 
     def some(cases):
         for name, figure in every(cases):
@@ -237,6 +240,7 @@ def draw_chosen(folder, monkeypatch, chosen):
                 figures.pyplot().close(figure)
 
     monkeypatch.setattr(figures, "_course", made)
+    monkeypatch.setattr(figures, "_trajectories", seen)
     monkeypatch.setattr(figures, "figures", some)
     return figures.draw({elbows: synthetic(elbows) for elbows in (2, 1, 0)}, folder)
 
@@ -324,11 +328,11 @@ def test_runs_in_other_processes_report_their_progress_and_their_errors():
     assert_all_report_their_progress_and_their_errors()
 
 
-def direct(elbows, period, limit, steps=None):
+def direct(elbows, period, limit, steps=None, duration=5.0):
     """Energies and errors of the PD law on the bare simulator, from the paper's start and from the target's pose."""
     simulator = Simulator(elbows=elbows, num_envs=2)
     steps = np.array([period]) if steps is None else steps
-    pose, periods = simulator.arm.nominal_pose, round(5.0 / period)
+    pose, periods = simulator.arm.nominal_pose, round(duration / period)
     angle = Circle().angle(np.arange(periods + 1) * period, 0.0)
     target = Circle().position(angle)
     q_d, q_d_dot = inverse_kinematics(simulator.arm, pose, target, Circle().velocity(angle))
@@ -378,10 +382,10 @@ def test_paper_cases_are_as_published(elbows):
 
 @pytest.mark.slow
 def test_case_played_in_the_environment_is_the_bare_simulators():
-    settings = reproduce.settings_of(2, "paper", control_frequency=2000.0)
+    settings = reproduce.settings_of(2, "paper", control_frequency=2000.0, duration=2.5)
     values = reproduce.play(settings).values
     values["joint_1"] = values["joint_energy"][0]
-    expected = direct(2, 5e-4, 1000.0, settings.substeps)
+    expected = direct(2, 5e-4, 1000.0, settings.substeps, duration=2.5)
     for name in expected.keys() & values.keys():
         # Observations and actions are single precision.
         assert values[name] == pytest.approx(expected[name], rel=1e-6), name

@@ -16,10 +16,6 @@ def idle(observation):
     return np.zeros((len(observation), 10), dtype=np.float32)
 
 
-def shipped(observation):
-    return load_policy("ppo", elbows=2).predict(observation)[0]
-
-
 @pytest.fixture(scope="module")
 def pd():
     """The PD's metrics, which take a second."""
@@ -32,7 +28,8 @@ def test_shipped_policy_beats_the_pd_and_an_idle_arm_does_not(pd):
     found.pd = pd
     assert not found(100, idle)
     assert found.beaten is None
-    assert found(250, shipped)
+    policy = load_policy("ppo", elbows=2)
+    assert found(250, lambda observation: policy.predict(observation)[0])
     assert found.beaten is found.marks[1]
     assert found.beaten.steps == 250
     assert found.verdict().startswith("PD beaten after 250 steps")
