@@ -9,9 +9,10 @@ from typing import Annotated, Literal
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from agents.cli import Commands, Count, JsonObject, Seed
+from agents.jobs.machines import Machines
 from agents.task_options import Elbows, TaskOptions
 
-TASK = TaskOptions()
+TASK, MACHINES = TaskOptions(), Machines()
 app = Commands("python -m agents", "Controllers of the arm: training, evaluation, pictures, the paper's results.")
 
 NOTHING: dict[str, object] = {}
@@ -145,19 +146,22 @@ def bound(
 
 @app.command
 def bounds(
-    tasks: Positional[Path], output: Positional[Path], under_table: bool | None = None, workers: int | None = None
+    tasks: Positional[Path],
+    output: Positional[Path],
+    under_table: bool | None = None,
+    machines: OmitArgPrefixes[Machines] = MACHINES,
 ) -> None:
-    """Finds the bounds of many tasks in processes and writes a CSV; run it again to go on after an interruption.
+    """Finds the bounds of many tasks side by side and writes a CSV; run it again to go on after an interruption.
 
     Args:
         tasks: JSON file: a list of objects with the arguments of one environment each.
         output: CSV file: a row for each task.
         under_table: As in `bound`.
-        workers: Processes, one task each; as many as there are cores when None.
+        machines: Machines.
     """
     from agents.optimal.command import solve_file
 
-    solve_file(tasks, output, None if under_table is None else not under_table, workers)
+    solve_file(tasks, output, None if under_table is None else not under_table, machines)
 
 
 @app.command

@@ -233,8 +233,10 @@ def _users_errors() -> tuple[type[Exception], ...]:
     return ValueError, OSError, DependencyNotInstalled
 
 
-def _integer(rule: str, least: int) -> PrimitiveConstructorSpec[int]:
-    def parsed(words: list[str]) -> int:
+def _integer(rule: str, least: int, none: bool = False) -> PrimitiveConstructorSpec[Any]:
+    def parsed(words: list[str]) -> int | None:
+        if none and words[0] == "None":
+            return None
         if not re.fullmatch(r"[+-]?\d+", words[0]) or int(words[0]) < least:
             raise ValueError(f"must be {rule}, got {words[0]}")
         return int(words[0])
@@ -243,7 +245,7 @@ def _integer(rule: str, least: int) -> PrimitiveConstructorSpec[int]:
         nargs=1,
         metavar="INT",
         instance_from_str=parsed,
-        is_instance=lambda value: isinstance(value, int),
+        is_instance=lambda value: isinstance(value, int) or (none and value is None),
         str_from_instance=lambda value: [str(value)],
     )
 
@@ -264,6 +266,8 @@ def _json_object(words: list[str]) -> dict[str, Any]:
 
 Count = Annotated[int, _integer("a positive integer", 1)]
 """Option whose value is at least 1."""
+CountOrNone = Annotated[int | None, _integer("a positive integer", 1, none=True)]
+"""Option whose value is at least 1, or None."""
 Seed = Annotated[int, _integer("an integer of at least 0", 0)]
 """Option whose value is at least 0."""
 JsonObject = Annotated[

@@ -6,13 +6,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import UseAppendAction, arg
+from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
-from agents.cli import Commands, Count, JsonObject, spelled
+from agents.cli import Commands, Count, CountOrNone, JsonObject, spelled
+from agents.jobs.machines import Machines
 from agents.shipped import CURVES, OPTIMA
 from agents.task_options import Elbows, TaskOptions
-from benchmarks.machine import LATEST, LATEST_SPEED, RESULTS
+from benchmarks.machine import CACHE, LATEST, LATEST_SPEED, RESULTS
 
+MACHINES = Machines()
 app = Commands("python -m benchmarks", "Benchmarks of energy, learning, the optimum and the simulator's speed.")
 
 
@@ -22,7 +24,7 @@ def energy(words: Sequence[str]) -> Callable[..., None]:
 
     def energy(
         output: Path = LATEST,
-        episodes: Count | None = None,
+        episodes: CountOrNone = None,
         fresh: bool = False,
         full: bool = False,
         publish: bool = False,
@@ -31,6 +33,7 @@ def energy(words: Sequence[str]) -> Callable[..., None]:
         arm: Path | None = None,
         environment: JsonObject | None = None,
         trust: bool = False,
+        machines: OmitArgPrefixes[Machines] = MACHINES,
     ) -> None:
         """Energy and error of every controller with two, one and no elbow on the table, in the regimes A, B and C.
 
@@ -49,12 +52,14 @@ def energy(words: Sequence[str]) -> Callable[..., None]:
             arm: JSON file of your own arm, on which the classical controllers and your players are compared.
             environment: Further arguments of your own environment, such as '{"payload": 0.1}', in which the same play.
             trust: Whether to read a .zip, whose pickles can run any code when they are read.
+            machines: Machines.
         """
         from benchmarks.energy.own import measure_own
 
         measure_own(
             TaskOptions(elbows=elbows, arm=arm, environment=environment or {}), players, trust, output=output,
             episodes=episodes, fresh=fresh, full=full, publish=publish, command=spelled("benchmarks", "energy", words),
+            machines=machines, folder=CACHE if machines.storage is None else machines.place(Path("energy")),
         )  # fmt: skip
 
     return energy
@@ -76,7 +81,11 @@ def learning(output: Path = RESULTS, curves: Path = CURVES) -> None:
 
 @app.command
 def optimal(
-    output: Path = RESULTS, optima: Path = OPTIMA, fresh: bool = False, workers: Count = 2, front: bool = True
+    output: Path = RESULTS,
+    optima: Path = OPTIMA,
+    fresh: bool = False,
+    front: bool = True,
+    machines: OmitArgPrefixes[Machines] = MACHINES,
 ) -> None:
     """Best known return for each elbow count, also with the space under the table, and the front of energy and error.
 
@@ -84,12 +93,12 @@ def optimal(
         output: Folder for the summary.
         optima: Folder of the solutions; problems that were solved there before are kept.
         fresh: Whether to solve everything again.
-        workers: Number of processes; each solves one problem at a time.
         front: Whether to solve for other energy weights than the default one too.
+        machines: Machines.
     """
     from benchmarks.optimal import optimal as solve_optimal
 
-    solve_optimal(output, optima, fresh, workers, front)
+    solve_optimal(output, machines.place(optima), fresh, machines, front)
 
 
 @app.command

@@ -6,15 +6,17 @@ import json
 import sys
 import time
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from agents.control.trajectory import Trajectory
 from agents.files import check_writable, read_json, write_csv, write_text
+from agents.jobs.job import Job, Tell
+from agents.jobs.machines import Machines
 from agents.machine import machine, versions
 from agents.optimal.certificate import Optimum
 from agents.optimal.guesses import posture_guesses
@@ -22,7 +24,7 @@ from agents.optimal.problem import Problem
 from agents.optimal.search import certified
 from agents.optimal.solution import SolveError
 from agents.shipped import OPTIMA
-from agents.workers import Pool, compile_before
+from agents.workers import compile_before
 from elbow_gym.task.settings import Settings
 
 DEFAULT_WEIGHT = 0.001
@@ -98,11 +100,11 @@ def cached(cell: Cell, optima: Path = OPTIMA) -> dict[str, Any] | None:
     return plain["figures"] if plain["problem"] == cell.question else None
 
 
-def solve_cell(cell: Cell, optima: Path) -> str | None:
-    """Solves a cell and writes its files. Returns what went wrong, or None."""
+def solve_cell(cell: Cell, optima: Path, tell: Tell) -> str:
+    """Solves a cell and writes its files. Returns what went wrong, or ""."""
 
     def say(line: str) -> None:
-        print(f"  {cell.name}: {line}", file=sys.stderr, flush=True)
+        tell(0, f"  {cell.name}: {line}")
 
     parent = None if cell.parent is None else files(cell.parent, optima)[1]
     try:
@@ -116,7 +118,7 @@ def solve_cell(cell: Cell, optima: Path) -> str | None:
     except (SolveError, ValueError, ArithmeticError) as error:
         return str(error)
     save(cell, found.optimum, optima)
-    return None
+    return ""
 
 
 def save(cell: Cell, found: Optimum, optima: Path) -> None:
@@ -149,38 +151,45 @@ def write_summary(results: Path, optima: Path, failures: dict[str, str]) -> None
     write_csv(results / "optimal.csv", header, rows)
 
 
-def run_cells(todo: Sequence[Cell], optima: Path, workers: int) -> dict[str, str]:
-    """Solves cells in worker processes, with a bar; returns the failures' reasons by name."""
+def run_cells(todo: Sequence[Cell], optima: Path, machines: Machines) -> dict[str, str]:
+    """Solves cells side by side, with a bar; returns the failures' reasons by name."""
     from tqdm import tqdm
 
     failures: dict[str, str] = {}
     if todo:
         # A solution is played by one arm; the LQR around it finds its gains with a batch.
         compile_before([(Settings(), 1), Settings()])
-    with tqdm(total=len(todo), file=sys.stderr, unit="cell") as bar, Pool(workers) as pool:
+
+    def submit(cell: Cell) -> None:
+        pool.submit(cell, Job(partial(solve_cell, cell, optima), 1, cell.name, optima))
+
+    with tqdm(total=len(todo), file=sys.stderr, unit="cell") as bar, machines.pool(len(todo)) as pool:
         # The front and what may go under the table start from the bound of their elbow count, so they wait for that.
         waiting = [cell for cell in todo if cell.parent in todo]
-        running = {pool.submit(solve_cell, cell, optima): cell for cell in todo if cell not in waiting}
-        while running:
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                cell, reason = running.pop(future), future.result()
-                if reason is not None:
-                    failures[cell.name] = reason
-                bar.update()
-                bar.set_description(cell.name)
-                freed = [one for one in waiting if one.parent == cell]
-                running.update({pool.submit(solve_cell, one, optima): one for one in freed})
+        for cell in todo:
+            if cell not in waiting:
+                submit(cell)
+        for cell, reason in pool.outcomes(lambda _: None):
+            if isinstance(reason, Exception):
+                raise reason
+            if reason:
+                failures[cell.name] = reason
+            bar.update()
+            bar.set_description(cell.name)
+            for one in waiting:
+                if one.parent == cell:
+                    submit(one)
     return failures
 
 
-def optimal(output: Path, optima: Path, fresh: bool, workers: int, front: bool) -> None:
+def optimal(output: Path, optima: Path, fresh: bool, machines: Machines, front: bool) -> None:
     """Solves what is not there yet, writes optimal.csv and says what failed.
 
     Args:
         output: folder for optimal.csv.
         optima: folder of the solutions.
         fresh: solve everything again.
-        workers: processes, one problem each.
+        machines: what solves them.
         front: also the energy weights beside the default one.
 
     Raises:
@@ -192,7 +201,7 @@ def optimal(output: Path, optima: Path, fresh: bool, workers: int, front: bool) 
         check_writable(place)
     started = time.monotonic()
     todo = [cell for cell in cells(front) if fresh or cached(cell, optima) is None]
-    failures = run_cells(todo, optima, workers)
+    failures = run_cells(todo, optima, machines)
     write_summary(output, optima, failures)
     for name, reason in failures.items():
         print(f"failed: {name}: {reason}")

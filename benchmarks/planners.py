@@ -21,12 +21,14 @@ from agents.evaluation.player import Player
 from agents.evaluation.players import ELBOW_COUNTS, find_player
 from agents.evaluation.recording import record
 from agents.files import write_csv, write_text
+from agents.jobs.job import Job, Tell
+from agents.jobs.machines import do_all
 from agents.optimal.batch import bounds
 from agents.optimal.problem import Problem
 from agents.optimal.store import Store
 from agents.style import look
 from agents.tasks import plain_arguments
-from agents.workers import Job, Tell, compile_before, in_processes
+from agents.workers import compile_before
 from benchmarks.blocks import publish_blocks
 from benchmarks.energy import cache
 from benchmarks.energy.markdown import significant
@@ -217,7 +219,7 @@ def planners(
     compile_before([*((player.settings, 1) for player in players), *(player.settings for player in players)])
     jobs = {(task, name): Job(partial(_played, task, name, folder), 1) for task in tasks for name in PLAYERS}
     with tqdm(total=len(jobs), unit="episode", file=sys.stderr) as bar:
-        played = in_processes(jobs, bar.update)
+        played = do_all(jobs, bar.update)
     if solve:
         bounds([task.settings for task in tasks if task.name != NOMINAL])
     known = {task: task.bound() for task in tasks}

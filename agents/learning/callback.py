@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Mapping
 from typing import Any
 
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
-from tqdm import tqdm
 
-from agents.cli import forget_lost_terminal
+from agents.jobs.job import Tell, unwanted
 from agents.learning.actor import policy_of
 from agents.learning.checkpoint import save_checkpoint
 from agents.learning.evaluation import evaluation, evaluation_row, evaluation_seeds, sentence
 from agents.learning.run import Run
 from agents.learning.run_folder import Checkpoint
 from agents.learning.training_env import MeteredVectorEnv
-from agents.workers import unwanted
 from elbow_gym.baselines.policy import Policy
 from elbow_gym.task.settings import Settings
 
@@ -34,10 +31,10 @@ class Keeper(BaseCallback):
         run: the run.
         env: the batched environment under the model's.
         found: checkpoint that the run goes on from; None for a new run.
-        position: line of the progress bar on the terminal, from 0.
+        tell: hears of the control periods that are made, and of each evaluation in a line.
     """
 
-    def __init__(self, run: Run, env: MeteredVectorEnv, found: Checkpoint | None = None, position: int = 0) -> None:
+    def __init__(self, run: Run, env: MeteredVectorEnv, found: Checkpoint | None, tell: Tell) -> None:
         super().__init__()
         self._run, self._env, self._settings = run, env, Settings(**run.environment)
         progress = NEW if found is None else found.progress()
@@ -49,15 +46,7 @@ class Keeper(BaseCallback):
         if found is not None:
             self._best = run.files.restore_best(found)
             run.files.write_evaluations(self._rows)
-        self._bar = tqdm(
-            total=run.settings.total_timesteps,
-            initial=self._first,
-            desc=run.name,
-            position=position,
-            unit="step",
-            unit_scale=True,
-            disable=None,
-        )
+        self._tell, self._told = tell, 0
 
     @property
     def best(self) -> Policy:
@@ -79,14 +68,11 @@ class Keeper(BaseCallback):
         self._now = now
 
     def show(self, steps: int) -> None:
-        """Moves the progress bar to a number of control periods. KeyboardInterrupt where the run is `unwanted`."""
+        """Tells how many control periods are made. KeyboardInterrupt where the run is `unwanted`."""
         if unwanted():
             raise KeyboardInterrupt
-        try:
-            self._bar.update(steps - self._bar.n)
-        except OSError:
-            # Whoever closes a terminal may want the run to be saved, if not to go on.
-            forget_lost_terminal()
+        self._tell(steps - self._told)
+        self._told = steps
 
     def _on_step(self) -> bool:
         if unwanted():
@@ -115,7 +101,6 @@ class Keeper(BaseCallback):
 
     def finish(self, model: BaseAlgorithm) -> None:
         """Makes the last evaluation and checkpoint, after the training or its interruption."""
-        self._bar.close()
         self.evaluate(model)
         if model.num_timesteps < self._run.settings.total_timesteps:
             # Stopped between an action and its outcome: whoever goes on starts new episodes.
@@ -157,12 +142,7 @@ class Keeper(BaseCallback):
         self.tick(training=False)
 
     def _say(self, steps: int, figures: Mapping[str, float]) -> None:
-        if not self._bar.disable:
-            energy, error = figures["electrical_energy"], figures["steady_error_rms_mm"]
-            self._bar.set_postfix_str(f"{figures['return']:.1f}, {energy:.0f} J, {error:.1f} mm")
-            return
         done = max(1, steps - self._first)
         left = self._wall * (self._run.settings.total_timesteps - steps) / done if steps > self._first else math.nan
         eta = f", {left / 60:.0f} min left" if left > 0.0 else ""
-        line = f"{self._run.name}: {steps:>9,d} steps, {self._training:4.0f} s{eta}: {sentence(figures)}"
-        print(line, file=sys.stdout, flush=True)
+        self._tell(0, f"{self._run.name}: {steps:>9,d} steps, {self._training:4.0f} s{eta}: {sentence(figures)}")

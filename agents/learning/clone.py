@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import Trajectory
 from agents.files import check_writable
+from agents.jobs.job import Job, Tell
+from agents.jobs.machines import Machines, do_all
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.run import machine, versions
 from agents.learning.run_folder import RunFolder
 from agents.learning.threads import one_thread
-from agents.workers import Job, Tell, compile_before, in_processes
+from agents.workers import compile_before
 from elbow_gym.baselines.policy import Policy
 from elbow_gym.baselines.policy_card import PolicyCard
 from elbow_gym.task.settings import Settings
@@ -130,8 +132,9 @@ def clone_all(
     folders: list[Path],
     command: str,
     resume: bool = False,
+    machines: Machines | None = None,
 ) -> dict[int, dict[str, Any]]:
-    """Clones with several seeds side by side in processes, with a progress bar; the results by seed.
+    """Clones with several seeds side by side, in processes unless machines are given; the results by seed.
 
     Each folder gets the files of a `RunFolder` but checkpoints and logs. With `resume` the seeds that are finished are
     left alone; the others, a minute each, start anew.
@@ -153,7 +156,8 @@ def clone_all(
         if finished is not None:
             results[seed] = finished
         else:
-            jobs[seed] = Job(partial(_clone_one, settings, trajectory, how, seed, folder, command), how.rounds)
+            work = partial(_clone_one, settings, trajectory.absolute(), how, seed, folder, command)
+            jobs[seed] = Job(work, how.rounds, folder.name, folder)
     if jobs:
         for seed, folder in zip(seeds, folders, strict=True):
             if seed in jobs:
@@ -161,7 +165,7 @@ def clone_all(
         compile_before([settings])
         try:
             with tqdm(total=len(jobs) * how.rounds, unit="round", desc="clone") as bar:
-                results.update(in_processes(jobs, bar.update))
+                results.update(do_all(jobs, bar.update, machines))
         except KeyboardInterrupt:
             for folder in folders:
                 finished = RunFolder(folder).result() is not None

@@ -14,6 +14,7 @@ import tyro
 from tyro.conf import OmitArgPrefixes, subcommand
 
 from agents.cli import Count, Seed, spelled
+from agents.jobs.machines import Machines
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.presets import ALGORITHMS, default_settings
 from agents.learning.settings import AlgorithmSettings
@@ -48,8 +49,6 @@ class Seeds:
 class Schedule(Seeds):
     """Number, duration and folders of the runs."""
 
-    workers: Count = 2
-    """Number of processes; each trains one seed at a time."""
     label: str = ""
     """Word in the folders' names after the algorithm, such as "cloned", for runs that differ from the plain ones."""
     initial_policy: Path | None = None
@@ -73,7 +72,12 @@ class Teacher:
 def train_command(words: Sequence[str]) -> Callable[..., None]:
     """The command `train`, whose algorithm options have the defaults of the task that the words name."""
 
-    def train(task: OmitArgPrefixes[TaskOptions], run: OmitArgPrefixes[Schedule], algorithm: AlgorithmSettings) -> None:
+    def train(
+        task: OmitArgPrefixes[TaskOptions],
+        run: OmitArgPrefixes[Schedule],
+        machines: OmitArgPrefixes[Machines],
+        algorithm: AlgorithmSettings,
+    ) -> None:
         """Trains agents, several seeds side by side; Ctrl-C keeps the best policies so far.
 
         Each seed has a folder OUTPUT/ALGORITHM[_LABEL]_TASK_seedK with its best policy, evaluations.csv, checkpoints
@@ -81,10 +85,11 @@ def train_command(words: Sequence[str]) -> Callable[..., None]:
         """
         from agents.learning.train import train_all
 
+        run = replace(run, output=machines.place(run.output))
         runs = runs_of(task, run, algorithm, spelled("agents", "train", words))
         names = " to ".join(dict.fromkeys((runs[0].name, runs[-1].name)))
         print(f"{names}, into {run.output}: {algorithm}", flush=True)
-        train_all(runs, run.workers, run.resume)
+        train_all(runs, machines, run.resume)
 
     # The defaults follow from the task, and are known only now.
     train.__annotations__["algorithm"] = _algorithms(_named_task(words))
@@ -95,7 +100,10 @@ def clone_command(words: Sequence[str]) -> Callable[..., None]:
     """The command `clone`."""
 
     def clone(
-        teacher: OmitArgPrefixes[Teacher], run: OmitArgPrefixes[Seeds], imitation: OmitArgPrefixes[CloneSettings]
+        teacher: OmitArgPrefixes[Teacher],
+        run: OmitArgPrefixes[Seeds],
+        machines: OmitArgPrefixes[Machines],
+        imitation: OmitArgPrefixes[CloneSettings],
     ) -> None:
         """Clones the optimal trajectory and the LQR around it into networks, several seeds side by side.
 
@@ -106,10 +114,11 @@ def clone_command(words: Sequence[str]) -> Callable[..., None]:
         from elbow_gym.task.settings import Settings
 
         settings = Settings(elbows=teacher.elbows)
-        folders = [run.output / f"clone_elbows{teacher.elbows}_seed{seed}" for seed in run.all]
+        output = machines.place(run.output)
+        folders = [output / f"clone_elbows{teacher.elbows}_seed{seed}" for seed in run.all]
         source = OPTIMA / f"elbows{teacher.elbows}.npz" if teacher.trajectory is None else teacher.trajectory
         command = spelled("agents", "clone", words)
-        results = clone_all(settings, source, imitation, list(run.all), folders, command, run.resume)
+        results = clone_all(settings, source, imitation, list(run.all), folders, command, run.resume, machines)
         for result in results.values():
             print(f"{result['name']}: {result['training_seconds']:.0f} s, return {result['best']['return']:.2f}")
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from concurrent.futures import wait
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from agents.cli import forget_lost_terminal, sentence
 from agents.files import check_space, check_writable
+from agents.jobs.bar import Bar
+from agents.jobs.job import Job, Tell
+from agents.jobs.machines import Machines
 from agents.learning.checkpoint import buffer_size, check_versions, load_checkpoint
 from agents.learning.checkpoint_folder import Checkpoint
 from agents.learning.evaluation import sentence as figures_sentence
@@ -19,14 +22,14 @@ from agents.learning.run import Run
 from agents.learning.run_folder import KEPT
 from agents.learning.sac.settings import SACSettings
 from agents.learning.threads import one_thread
-from agents.workers import GRACE, Pool, compile_before, outcome
+from agents.workers import compile_before, cores
 from elbow_gym.task.settings import Settings
 
 SEED_STRIDE = 1_000_000
 """Arm i of a run with seed s draws from seed s * SEED_STRIDE + i: no two runs share an arm, nor an evaluation's."""
 
 
-def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
+def train(run: Run, resume: bool = False, tell: Tell = lambda *_: None) -> dict[str, Any]:
     """Trains one seed; Ctrl-C ends it and keeps the best policy so far.
 
     Writes what `RunFolder` lists: the best policy each time an evaluation improves, a row per evaluation, a checkpoint
@@ -36,7 +39,7 @@ def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
         run: what is trained.
         resume: go on from the folder's latest checkpoint that is whole; a run that has made all its steps is left
             alone. Without a checkpoint it starts anew.
-        position: line of the progress bar on the terminal, from 0.
+        tell: hears of the control periods that are made, and of each evaluation in a line.
 
     Returns:
         Name, seed, control periods and seconds of the run, and the metrics of its best evaluation; those are None
@@ -72,7 +75,7 @@ def train(run: Run, resume: bool = False, position: int = 0) -> dict[str, Any]:
         # One more than is kept lies there while it is written.
         check_space(files.path.parent, (1 + KEPT) * buffer_size(model))
         files.open(run.record(), resume)
-        keeper = Keeper(run, env, found, position)
+        keeper = Keeper(run, env, found, tell)
         begun = found is not None
         try:
             if not begun:
@@ -145,33 +148,38 @@ def _prepare(run: Run, model: Any, env: Any, keeper: Any) -> None:
             imitate(model, shown, run.settings.imitation_steps, run.seed)
 
 
-def train_all(runs: Sequence[Run], workers: int = 2, resume: bool = False) -> list[dict[str, Any]]:
-    """Trains several runs, `workers` of them at a time in processes, and prints a line about each at its end.
+def train_all(runs: Sequence[Run], machines: Machines | None = None, resume: bool = False) -> list[dict[str, Any]]:
+    """Trains several runs side by side with one progress bar, and prints a line about each at its end.
 
     Ctrl-C, or SIGTERM and SIGHUP under `agents.cli.Commands`, ends all of them; each keeps its best policy so far. A
     run that fails leaves the others going on.
+
+    Args:
+        runs: what is trained.
+        machines: where; processes of this machine when None. A single run, or a single worker's, are trained in this
+            process.
+        resume: as in `train`.
 
     Returns:
         The results in the runs' order.
 
     Raises:
-        ValueError: there are no runs, `workers` is not positive, or a folder holds a run and `resume` is not set, a
-            run with other settings, or damaged files; no run starts then.
+        ValueError: there are no runs, or a folder holds a run and `resume` is not set, a run with other settings, or
+            damaged files; no run starts then.
         OSError: a folder cannot be written, before or while its run trains.
         KeyboardInterrupt: the runs were interrupted.
     """
     if not runs:
         raise ValueError("runs must be at least one, got none")
-    if workers < 1:
-        raise ValueError(f"workers must be positive, got {workers}")
+    machines = machines or Machines()
     for run in runs:
         run.files.check(run.record(), resume)
     for run in runs:
         check_writable(run.folder)
-    trained = Settings(**runs[0].environment)
-    compile_before([(trained, runs[0].settings.num_envs), trained])
-    apart = workers > 1 and len(runs) > 1
-    outcomes = _side_by_side(runs, workers, resume) if apart else _one_by_one(runs, resume)
+    compile_before(_batches(runs))
+    apart = machines.ray is not None or min(machines.workers or cores(), len(runs)) > 1
+    with Bar(sum(run.settings.total_timesteps for run in runs), "step") as bar:
+        outcomes = _side_by_side(runs, machines, bar) if apart else _one_by_one(runs, resume, bar)
     for run, one in zip(runs, outcomes, strict=True):
         print(_line(run, one), flush=True)
     for one in outcomes:
@@ -182,35 +190,43 @@ def train_all(runs: Sequence[Run], workers: int = 2, resume: bool = False) -> li
     return outcomes
 
 
-def _one_by_one(runs: Sequence[Run], resume: bool) -> list[Any]:
+def _batches(runs: Sequence[Run]) -> list[tuple[Settings, int] | Settings]:
+    """Environments of the runs' trainings and evaluations, for `compile_before`."""
+    trained = [(Settings(**run.environment), run.settings.num_envs) for run in runs]
+    return [one for settings, arms in trained for one in ((settings, arms), settings)]
+
+
+def _one_by_one(runs: Sequence[Run], resume: bool, tell: Tell) -> list[Any]:
     outcomes: list[Any] = []
     for run in runs:
-        outcomes.append(_attempt(run, resume))
+        outcomes.append(_attempt(run, resume, tell))
         if isinstance(outcomes[-1], dict) and not outcomes[-1]["finished"]:
             break
     return outcomes + [None] * (len(runs) - len(outcomes))
 
 
-def _attempt(run: Run, resume: bool) -> Any:
+def _attempt(run: Run, resume: bool, tell: Tell) -> Any:
     try:
-        return train(run, resume)
+        return train(run, resume, tell)
     except Exception as error:
         return error
 
 
-def _side_by_side(runs: Sequence[Run], workers: int, resume: bool) -> list[Any]:
-    interrupted = False
-    with Pool(min(workers, len(runs))) as pool:
-        futures = [pool.submit(train, run, resume, k) for k, run in enumerate(runs)]
+def _side_by_side(runs: Sequence[Run], machines: Machines, tell: Tell) -> list[Any]:
+    outcomes: dict[int, Any] = {}
+    with machines.pool(len(runs)) as pool:
+        for k, run in enumerate(runs):
+            # The folders are checked: a run in one of them is this one, which another worker has begun.
+            work = partial(train, run, True)
+            pool.submit(k, Job(work, run.settings.total_timesteps, run.name, run.folder))
         try:
-            wait(futures)
+            outcomes.update(pool.outcomes(tell))
         except KeyboardInterrupt:
-            interrupted = True
             pool.stop()
-            wait(futures, GRACE)
-    outcomes = [outcome(future) for future in futures]
-    # Whoever did not end in time was killed on purpose.
-    return [None if interrupted and isinstance(one, ChildProcessError) else one for one in outcomes]
+            # Whoever does not end in time is killed on purpose.
+            ended = pool.outcomes(tell)
+            outcomes.update((k, None if isinstance(one, ChildProcessError) else one) for k, one in ended)
+    return [outcomes[k] for k in range(len(runs))]
 
 
 def _line(run: Run, ended: Any) -> str:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
+from agents.jobs.job import Job, Tell
+from agents.jobs.machines import Machines
 from agents.optimal.certificate import Bound
 from agents.optimal.search import bound
 from agents.optimal.solution import SolveError
 from agents.optimal.store import Store
-from agents.workers import Pool, compile_before, cores
+from agents.workers import compile_before
 from elbow_gym.task.settings import Settings
 
 
@@ -20,6 +22,7 @@ def bounds(
     *,
     above_table: bool | None = None,
     workers: int | None = None,
+    machines: Machines | None = None,
     progress: Callable[[int], Any] = lambda _: None,
     store: Store | None = None,
 ) -> list[Bound | str]:
@@ -32,6 +35,7 @@ def bounds(
         tasks: arguments of `bound`.
         above_table: as in `bound`.
         workers: processes, one task each; as many as there are cores when None.
+        machines: what solves them in place of `workers`.
         progress: called with a task's number when it is done.
         store: folder of the solved tasks; the checkout's own when None.
     """
@@ -40,18 +44,21 @@ def bounds(
     # The descent and the LQR step a batch, and one arm plays the solution.
     compile_before([pair for one in kernels.values() for pair in ((one, 1), one)])
     found: dict[int, Bound | str] = {}
-    with Pool(min(workers or cores(), max(len(tasks), 1))) as pool:
-        running = {pool.submit(_bound_apart, one, above_table, store): k for k, one in enumerate(tasks)}
-        while running:
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                k = running.pop(future)
-                found[k] = future.result()
-                progress(k)
+    store.folder.mkdir(parents=True, exist_ok=True)
+    with (machines or Machines(workers=workers)).pool(len(tasks)) as pool:
+        for k, one in enumerate(tasks):
+            pool.submit(k, Job(partial(_bound_apart, one, above_table, store), 1, f"task {k}", store.folder))
+        for k, answer in pool.outcomes(lambda _: None):
+            if isinstance(answer, Exception) and not isinstance(answer, ChildProcessError):
+                raise answer
+            found[k] = str(answer) if isinstance(answer, ChildProcessError) else answer
+            progress(k)
     return [found[k] for k in range(len(tasks))]
 
 
-def _bound_apart(settings: Settings, above_table: bool | None, store: Store) -> Bound | str:
+def _bound_apart(settings: Settings, above_table: bool | None, store: Store, tell: Tell) -> Bound | str:
     """`bound` in a process of its own; a failure as its reason, which is no error of the others."""
+    del tell
     try:
         return bound(settings, above_table=above_table, store=store)
     except (SolveError, ValueError) as error:

@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from agents.files import check_writable, read_objects, write_csv
+from agents.jobs.machines import Machines
 from agents.optimal.batch import bounds
 from agents.optimal.certificate import Bound
 from agents.optimal.search import bound
+from agents.optimal.store import Store
 from elbow_gym.parameters import as_arm
 from elbow_gym.task.settings import Settings
 
@@ -66,14 +68,14 @@ def solve_and_print(
         print(output)
 
 
-def solve_file(tasks: Path, output: Path, above_table: bool | None, workers: int | None) -> None:
+def solve_file(tasks: Path, output: Path, above_table: bool | None, machines: Machines) -> None:
     """Finds the bounds of the tasks of a file with a bar on stderr, and writes a row for each.
 
     Args:
         tasks: JSON list of objects, the arguments of one environment each.
         output: CSV of the tasks' numbers, what became of them, and the figures.
         above_table: as in `bound`.
-        workers: processes; as many as there are cores when None.
+        machines: what solves them; their storage, where they have one, holds the store.
 
     Raises:
         ValueError: the file holds something else, or an environment refuses a task, which is named by its number.
@@ -82,8 +84,11 @@ def solve_file(tasks: Path, output: Path, above_table: bool | None, workers: int
 
     check_writable(output.parent)
     settings = _settings_in(tasks)
+    store = None if machines.storage is None else Store(machines.place(Path("bounds")))
     with tqdm(total=len(settings), unit="task", file=sys.stderr) as bar:
-        found = bounds(settings, above_table=above_table, workers=workers, progress=lambda _: bar.update())
+        found = bounds(
+            settings, above_table=above_table, machines=machines, progress=lambda _: bar.update(), store=store
+        )
     solved = [one for one in found if isinstance(one, Bound)]
     names = list(solved[0].figures) if solved else []
     rows = [

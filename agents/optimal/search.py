@@ -15,6 +15,8 @@ from itertools import islice
 from typing import TypeVar
 
 from agents.control.trajectory import Trajectory
+from agents.jobs.job import Job, Tell
+from agents.jobs.machines import do_all
 from agents.optimal.certificate import Bound, checked
 from agents.optimal.descent import STAGES, Descended, Descent
 from agents.optimal.guesses import posture_guesses, simulated
@@ -22,7 +24,7 @@ from agents.optimal.problem import Problem
 from agents.optimal.solution import LOOSE, SMOOTHINGS, Point, Progress, Solution, SolveError, solve
 from agents.optimal.store import Neighbour, Store
 from agents.planning.collocation import Transcription
-from agents.workers import Job, Tell, compile_before, in_processes
+from agents.workers import compile_before
 from elbow_gym.task.settings import Settings
 
 Found = TypeVar("Found", Descended, Solution)
@@ -85,7 +87,7 @@ def _of_each(
     elsewhere = 0.0
     if parallel and len(guesses) > 1:
         jobs = {name: Job(partial(_apart, way, problem, guess), 1) for name, guess in guesses.items()}
-        results = in_processes(jobs, lambda _: None)
+        results = do_all(jobs, lambda _: None)
         elsewhere = sum(seconds for *_, seconds in results.values())
         answers = {name: answer for name, (answer, _, _) in results.items()}
         for name, (_, said, _) in results.items():

@@ -13,12 +13,13 @@ import numpy as np
 from agents.evaluation.metrics import joint_energies, metrics
 from agents.evaluation.recording import Recording, record, thinned
 from agents.files import check_writable, write_text, write_whole
+from agents.jobs.job import Job
+from agents.jobs.machines import do_all
 from agents.paper.claims import Claim, Numbers, as_markdown, verdict
 from agents.paper.figures import SETTLED, draw, write_series
 from agents.paper.numbers import PUBLISHED_CASES, numbers_table, write_numbers
 from agents.paper.subject import Subject
 from agents.tasks import Elbows
-from agents.workers import Job, in_processes
 from elbow_gym.baselines.pd import CLIPPED, UNLIMITED, PDController
 from elbow_gym.task.settings import Settings
 
@@ -159,4 +160,4 @@ def case_numbers(runs: Mapping[str, Mapping[str, Any]]) -> Numbers:
 
 def play_all(jobs: Mapping[Any, Settings], progress: Callable[[int], Any]) -> dict[Any, Played]:
     """Results of `play` for every job, each in its own process."""
-    return in_processes({key: Job(partial(play, jobs[key]), jobs[key].horizon) for key in jobs}, progress)
+    return do_all({key: Job(partial(play, jobs[key]), jobs[key].horizon) for key in jobs}, progress)

@@ -15,9 +15,11 @@ from agents.evaluation.player import Player
 from agents.evaluation.players import TABLE, Entry
 from agents.evaluation.recording import Recording, thinned
 from agents.evaluation.regimes import RECORDING_PERIOD, recordings
+from agents.jobs.job import Job, Tell, counted
+from agents.jobs.machines import do_all
 from agents.paper.cases import RECORD_PERIOD, measure
 from agents.paper.figures import SERIES_PERIOD
-from agents.workers import Job, Tell, compile_before, counted, in_processes
+from agents.workers import compile_before
 from elbow_gym.task.settings import STARTS
 
 PAPER_PD = ("pd_paper", "pd")
@@ -84,7 +86,7 @@ def collect(entries: Sequence[Entry | Visitor]) -> list[Run]:
     layout = "{desc} {percentage:3.0f}%|{bar}| {elapsed} elapsed, {remaining} left"
     # Work is told of in bursts: the time left follows the mean speed.
     with tqdm(total=sum(sizes.values()), desc="playing", bar_format=layout, smoothing=0.0, file=sys.stderr) as bar:
-        played = in_processes({entry: Job(partial(play, entry), sizes[entry]) for entry in entries}, bar.update)
+        played = do_all({entry: Job(partial(play, entry), sizes[entry]) for entry in entries}, bar.update)
     return [run for entry in entries for run in played[entry]]
 
 

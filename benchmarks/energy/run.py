@@ -20,9 +20,11 @@ from agents.evaluation.player import Player
 from agents.evaluation.players import ELBOW_COUNTS
 from agents.evaluation.regimes import BENCHMARK_SEEDS, SHIFTED, in_all_regimes
 from agents.files import check_writable, write_text, write_whole
+from agents.jobs.job import Job, Tell, counted
+from agents.jobs.machines import Machines, do_all
 from agents.machine import machine, versions
 from agents.tasks import plain_arguments
-from agents.workers import Job, Tell, compile_before, counted, in_processes
+from agents.workers import compile_before
 from benchmarks import learning
 from benchmarks.blocks import publish_blocks
 from benchmarks.energy import breakdown, cache, effort, pareto, terminal
@@ -164,11 +166,8 @@ def played_rows(cell: Cell, plan: Plan, tell: Tell) -> list[Row]:
     return rows_of(cell, play(cell, plan, tell), plan.every_seed)
 
 
-def measure(plan: Plan, parallel: bool = True) -> list[Row]:
-    """The rows of all cells; those that were not played before are played, with a bar, one on each core if `parallel`.
-
-    The kernel is compiled before.
-    """
+def measure(plan: Plan, parallel: bool = True, machines: Machines | None = None) -> list[Row]:
+    """The rows of all cells; those not played before are played with a bar, the kernel compiled, `parallel` or not."""
     from tqdm import tqdm
 
     before = {cell: found for cell in plan.cells if (found := stored(cell, plan)) is not None}
@@ -179,7 +178,7 @@ def measure(plan: Plan, parallel: bool = True) -> list[Row]:
         total = sum(work(cell, plan.every_seed) for cell in todo)
         with tqdm(total=total, file=sys.stderr, bar_format="{l_bar}{bar}| {elapsed} < {remaining}") as bar:
             jobs = {cell: Job(partial(played_rows, cell, plan), work(cell, plan.every_seed)) for cell in todo}
-            done = in_processes(jobs, bar.update) if parallel else {c: jobs[c].work(bar.update) for c in todo}
+            done = do_all(jobs, bar.update, machines) if parallel else {c: jobs[c].work(bar.update) for c in todo}
         rows.update(done)
     return [row for cell in plan.cells for row in rows[cell]]
 
@@ -251,6 +250,7 @@ def energy(
     publish: bool = False,
     folder: Path = CACHE,
     parallel: bool = True,
+    machines: Machines | None = None,
     command: str = "",
     guests: Sequence[Guest] = (),
     planners: Sequence[str] = (),
@@ -267,6 +267,7 @@ def energy(
         publish: a full run whose results go to benchmarks/results, and their tables into the READMEs.
         folder: where results of single cells are kept.
         parallel: one cell on each core.
+        machines: what plays the cells in place of this one's processes.
         command: the command line, for energy.json.
         guests: players of the user's own, which play the nominal part.
         planners: names of planners, which play it, too.
@@ -291,7 +292,7 @@ def energy(
     output = RESULTS if publish else output
     for place in (output, folder):
         check_writable(place)
-    rows = measure(chosen, parallel)
+    rows = measure(chosen, parallel, machines)
     save(rows, chosen, time.monotonic() - started, output, command)
     effort.save(chosen.cells, output / "effort.csv")
     changed = publish_blocks(output) if publish else []

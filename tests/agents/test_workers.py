@@ -1,17 +1,14 @@
 """Work before processes start: each kernel is made once, with one line about the time where it takes long."""
 
 import os
-import signal
 import sys
 import time
-from concurrent.futures import Future
-from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 
 import pytest
 
 from agents import workers
-from agents.workers import KILLED, Pool, compile_before, cores, counted, in_processes, outcome
+from agents.workers import compile_before, cores
 from elbow_gym.task.settings import Settings
 
 
@@ -72,15 +69,6 @@ def test_nothing_is_said_of_kernels_that_are_there(made, capsys):
     assert len(made) == 1
 
 
-def test_units_are_told_once_each_however_the_steps_fall():
-    told = []
-    progress = counted(10, told.append)
-    for done in (1, 2, 3, 7):
-        progress(done, 7)
-    assert sum(told) == 10
-    assert told == [1, 1, 2, 6]
-
-
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no affinity on this system")
 def test_cores_are_those_that_the_job_may_use():
     allowed = os.sched_getaffinity(0)
@@ -90,45 +78,3 @@ def test_cores_are_those_that_the_job_may_use():
     finally:
         os.sched_setaffinity(0, allowed)
     assert cores() == len(allowed)
-
-
-def of(result=None, error=None):
-    future = Future()
-    future.set_exception(error) if error else future.set_result(result)
-    return future
-
-
-def test_outcome_is_the_result_or_the_error_or_none_where_the_work_was_stopped():
-    assert outcome(of(result=3)) == 3
-    error = ValueError("wrong")
-    assert outcome(of(error=error)) is error
-    assert outcome(of(error=InterruptedError("another run failed"))) is None
-    assert outcome(Future()) is None
-    killed = outcome(of(error=BrokenProcessPool()))
-    assert isinstance(killed, ChildProcessError)
-    assert str(killed) == KILLED
-
-
-def own_environment():
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ())
-    return [os.environ[name] for name in workers.ONE_THREAD], sorted(blocked), os.getpid()
-
-
-def die(_):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-@pytest.mark.slow
-def test_workers_have_one_thread_each_and_hear_no_signals_and_nothing_of_it_stays_here(monkeypatch):
-    for name in workers.ONE_THREAD[1:]:
-        monkeypatch.delenv(name, raising=False)
-    before = dict(os.environ)
-    with Pool(1) as pool:
-        threads, blocked, pid = pool.submit(own_environment).result()
-    assert threads[1:] == ["1", "1"]
-    assert {signal.SIGINT, signal.SIGTERM, signal.SIGHUP} <= set(blocked)
-    assert pid != os.getpid()
-    assert dict(os.environ) == before
-    assert not signal.pthread_sigmask(signal.SIG_BLOCK, ())
-    with pytest.raises(ChildProcessError, match="a worker process was killed, perhaps because memory ran out"):
-        in_processes({"only": workers.Job(die, 1)}, lambda _: None)

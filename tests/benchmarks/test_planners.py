@@ -65,7 +65,7 @@ def test_planners_table_is_made_of_its_rows_and_episodes_are_played_once(tmp_pat
     counted = []
     monkeypatch.setattr(module, "PLAYERS", ("ppo",))
     monkeypatch.setattr(module, "ELBOW_COUNTS", (2,))
-    monkeypatch.setattr(module, "in_processes", lambda jobs, tell: {key: job.work(tell) for key, job in jobs.items()})
+    monkeypatch.setattr(module, "do_all", lambda jobs, tell: {key: job.work(tell) for key, job in jobs.items()})
 
     def played(task, player):
         counted.append(task.name)

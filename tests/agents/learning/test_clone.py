@@ -56,7 +56,7 @@ def test_same_seed_gives_the_same_clone_bit_for_bit(beginning):
 
 @pytest.fixture
 def here(monkeypatch):
-    monkeypatch.setattr(cloning, "in_processes", in_this_process)
+    monkeypatch.setattr(cloning, "do_all", in_this_process)
 
 
 @pytest.mark.usefixtures("here")

@@ -108,14 +108,14 @@ def test_commands_in_clones_cards_clone_with_the_settings_of_the_card(monkeypatc
     for name in [name for name in shipped_policies() if name.startswith("clone")]:
         card = card_of(name)
         app.run(card.command.removeprefix("python -m agents ").split())
-        settings, trajectory, how, seeds, folders, command, resume = cloned.pop()
+        settings, trajectory, how, seeds, folders, command, resume, machines = cloned.pop()
         assert card.training["seed"] in seeds
         assert name in {folder.name for folder in folders}
         assert settings.elbows == card.environment["elbows"]
         assert trajectory.is_file()
         recorded = {field.name: card.training[field.name] for field in fields(CloneSettings)}
         assert json.loads(json.dumps(asdict(how))) == recorded
-        assert (command, resume) == (card.command, False)
+        assert (command, resume, machines.ray) == (card.command, False, None)
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,8 @@ import torch
 from stable_baselines3 import PPO
 from tqdm import tqdm
 
+from agents.jobs.bar import Bar
+from agents.jobs.machines import Machines
 from agents.learning.callback import Keeper
 from agents.learning.checkpoint import running
 from agents.learning.evaluation import COLUMNS
@@ -32,7 +34,7 @@ from agents.learning.train import train, train_all
 from agents.learning.training_env import MeteredVectorEnv
 from elbow_gym.baselines.policy import read_policy
 from tests.support.trainings import SAC_KILLED, SAC_SMALL, SMALL, small_run
-from tests.support.workers import PoolHere
+from tests.support.workers import do_jobs_here
 
 ROOT = Path(__file__).parents[3]
 
@@ -203,7 +205,7 @@ def test_minutes_end_a_run(tmp_path):
 
 def assert_seeds_train_what_they_train_alone(done, folder):
     runs = [small_run(folder / f"seed{seed}", seed=seed) for seed in (0, 1)]
-    results = train_all(runs, workers=2)
+    results = train_all(runs, Machines(workers=2))
     assert [result["name"] for result in results] == ["seed0", "seed1"]
     for name, alone in weights(done[0].folder).items():
         np.testing.assert_array_equal(weights(folder / "seed0")[name], alone)
@@ -212,7 +214,7 @@ def assert_seeds_train_what_they_train_alone(done, folder):
 
 @pytest.mark.slow
 def test_seeds_sent_to_processes_train_what_they_train_alone(done, tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.learning.train.Pool", PoolHere)
+    do_jobs_here(monkeypatch)
     assert_seeds_train_what_they_train_alone(done, tmp_path)
 
 
@@ -223,7 +225,7 @@ def test_seeds_in_processes_train_what_they_train_alone(done, tmp_path):
 
 def test_no_workers_and_no_runs_are_refused(tmp_path):
     with pytest.raises(ValueError, match="workers must be positive, got 0"):
-        train_all([small_run(tmp_path / "run")], workers=0)
+        train_all([small_run(tmp_path / "run")], Machines(workers=0))
     with pytest.raises(ValueError, match="runs must be at least one, got none"):
         train_all([])
 
@@ -231,7 +233,7 @@ def test_no_workers_and_no_runs_are_refused(tmp_path):
 def test_no_seed_starts_where_a_folder_holds_another_run(done, tmp_path):
     new = small_run(tmp_path / "new", seed=1)
     with pytest.raises(ValueError, match="output must be free of earlier runs"):
-        train_all([new, done[0]], workers=1)
+        train_all([new, done[0]], Machines(workers=1))
     assert not new.folder.exists()
 
 
@@ -244,14 +246,15 @@ def test_run_that_nobody_waits_for_any_more_stops(monkeypatch, tmp_path):
 
 
 def test_run_goes_on_where_its_terminal_is_gone(tmp_path, monkeypatch):
-    class Bar(tqdm):
-        def update(self, n=1):
-            raise OSError(errno.EIO, "Input/output error")
+    def lost(*_, **__):
+        raise OSError(errno.EIO, "Input/output error")
 
     forgotten = []
-    monkeypatch.setattr("agents.learning.callback.tqdm", Bar)
-    monkeypatch.setattr("agents.learning.callback.forget_lost_terminal", lambda: forgotten.append(True))
-    assert train(small_run(tmp_path / "run"))["finished"]
+    monkeypatch.setattr(tqdm, "update", lost)
+    monkeypatch.setattr(tqdm, "write", lost)
+    monkeypatch.setattr("agents.jobs.bar.forget_lost_terminal", lambda: forgotten.append(True))
+    with Bar(1024, "step") as bar:
+        assert train(small_run(tmp_path / "run"), tell=bar)["finished"]
     assert forgotten
 
 
@@ -268,11 +271,11 @@ def interrupted_after(steps, monkeypatch):
 
 @pytest.mark.parametrize("apart", [False, True], ids=["one-by-one", "side-by-side"])
 def test_interruption_ends_every_seed_with_a_line_each(tmp_path, monkeypatch, capsys, apart):
-    monkeypatch.setattr("agents.learning.train.Pool", PoolHere)
+    do_jobs_here(monkeypatch)
     interrupted_after(300, monkeypatch)
     runs = [small_run(tmp_path / f"seed{seed}", seed=seed) for seed in (0, 1)]
     with pytest.raises(KeyboardInterrupt):
-        train_all(runs, workers=2 if apart else 1)
+        train_all(runs, Machines(workers=2 if apart else 1))
     first, second = capsys.readouterr().out.splitlines()[-2:]
     assert re.match(r"seed0: not finished after 304 steps, best: return -", first)
     if apart:
@@ -298,7 +301,7 @@ def test_run_that_was_interrupted_while_it_prepared_starts_anew(tmp_path, monkey
 
 
 def test_seed_that_fails_leaves_the_others_going_on(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("agents.learning.train.Pool", PoolHere)
+    do_jobs_here(monkeypatch)
     runs = [small_run(tmp_path / f"seed{seed}", seed=seed) for seed in (0, 1)]
     write = RunFolder.write_evaluations
 

@@ -5,6 +5,7 @@ import pytest
 
 from agents import optimal
 from agents.control.trajectory import Trajectory
+from agents.jobs.machines import Machines
 from agents.optimal import command
 from agents.optimal.command import settings_of, solve_and_print, solve_file
 from agents.optimal.store import Store
@@ -59,7 +60,7 @@ def test_tasks_of_a_file_become_rows_and_those_that_fail_are_named(tmp_path, mon
     monkeypatch.setattr(command, "bounds", here)
     tasks, output = tmp_path / "tasks.json", tmp_path / "bounds.csv"
     tasks.write_text('[{"elbows": 1, "payload": 0.2}, {"elbows": 0}]')
-    solve_file(tasks, output, None, None)
+    solve_file(tasks, output, None, Machines())
     assert [(one.elbow_joints, one.payload, one.start_noise) for one in given] == [((4,), 0.2, 0.0), ((), 0.0, 0.0)]
     assert output.read_text().splitlines() == ["task,status", "0,no guess converged", "1,no guess converged"]
     assert "task 1 failed: no guess converged\n0 of 2 tasks solved" in capsys.readouterr().out
@@ -70,7 +71,7 @@ def test_a_file_of_something_else_is_refused_before_anything_is_solved(tmp_path,
     tasks = tmp_path / "tasks.json"
     tasks.write_text(text)
     with pytest.raises(ValueError, match=r"tasks\.json must hold"):
-        solve_file(tasks, tmp_path / "bounds.csv", None, None)
+        solve_file(tasks, tmp_path / "bounds.csv", None, Machines())
     tasks.write_text('[{"elbow": 1}]')
     with pytest.raises(ValueError, match=r"task 0 of .*tasks\.json: .*elbow"):
-        solve_file(tasks, tmp_path / "bounds.csv", None, None)
+        solve_file(tasks, tmp_path / "bounds.csv", None, Machines())

@@ -319,7 +319,7 @@ def assert_all_report_their_progress_and_their_errors():
 
 
 def test_runs_sent_to_other_processes_report_their_progress_and_their_errors(monkeypatch):
-    monkeypatch.setattr(reproduce, "in_processes", in_this_process)
+    monkeypatch.setattr(reproduce, "do_all", in_this_process)
     assert_all_report_their_progress_and_their_errors()
 
 

@@ -51,7 +51,7 @@ def test_kernels_that_are_compiled_before_are_those_of_the_batches_that_run():
 def test_a_run_that_was_made_before_starts_no_process_and_compiles_nothing(tmp_path, monkeypatch):
     chosen = Plan([Cell("ppo", 2), Cell("clone", 1)], [20_000], every_seed=False, folder=tmp_path)
     rows = measure(chosen, parallel=False)
-    for name in ("compile_before", "in_processes", "in_all_regimes"):
+    for name in ("compile_before", "do_all", "in_all_regimes"):
         monkeypatch.setattr(run, name, lambda *_: pytest.fail("made again"))
     assert measure(chosen) == rows
 

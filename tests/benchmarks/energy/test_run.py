@@ -136,7 +136,7 @@ def test_progress_tells_all_of_the_work_once(measured, tmp_path):
 @pytest.mark.slow
 def test_cells_sent_to_processes_are_those_played_here(measured, monkeypatch):
     folder, rows = measured
-    monkeypatch.setattr(energy, "in_processes", in_this_process)
+    monkeypatch.setattr(energy, "do_all", in_this_process)
     assert energy.measure(Plan(QUICK[:1], [20_000, 20_001], folder=folder / "other")) == rows[:3]
 
 
