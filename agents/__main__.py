@@ -60,24 +60,28 @@ def clone(words: Sequence[str]) -> Callable[..., None]:
     return clone_command(words)
 
 
-@app.command
-def publish(
-    runs: Annotated[tuple[Path, ...], Positional, arg(metavar="FOLDER [FOLDER ...]", help_behavior_hint="(required)")],
-    /,
-    replace_seeds: bool = False,
-    allow_worse: bool = False,
-) -> None:
-    """Takes finished runs over into the shipped policies and learning curves; a task's best seed is its baseline.
+@app.command_from
+def sweep(words: Sequence[str]) -> Callable[..., None]:
+    """Compares algorithms, elbows, settings and arguments of the environment over seeds: a table and a figure."""
+    from agents.sweep.command import sweep_command
 
-    Args:
-        runs: Folders of the runs, as the training named them.
-        replace_seeds: Whether to remove the shipped seeds of the same algorithm and task that are not among the runs.
-        allow_worse: Whether a shipped policy may give way to one with a worse return; otherwise that is refused.
-    """
-    from agents.learning.publish import publish as publish_runs
+    return sweep_command(words)
 
-    for name in publish_runs(runs, replace_seeds=replace_seeds, allow_worse=allow_worse):
-        print(name)
+
+@app.command_from
+def best(words: Sequence[str]) -> Callable[..., None]:
+    """Trains the best trial of each task of a sweep, and publishes it if asked for."""
+    from agents.sweep.command import best_command
+
+    return best_command(words)
+
+
+@app.command_from
+def publish(words: Sequence[str]) -> Callable[..., None]:
+    """Takes finished runs over into the shipped policies and learning curves; a task's best seed is its baseline."""
+    from agents.learning.command import publish_command
+
+    return publish_command(words)
 
 
 @app.command

@@ -42,11 +42,15 @@ Elbows = Annotated[
 them to the environment."""
 
 
+EnvironmentId = Literal["ElbowArm-v0", "ElbowArmTable-v0", "ElbowArmRandom-v0", "ElbowArmTasks-v0"]
+"""Option whose value is a Gymnasium id."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class TaskOptions:
     """Environment. Its id and the elbows choose the defaults of the algorithm options of a training."""
 
-    env: Literal["ElbowArm-v0", "ElbowArmTable-v0", "ElbowArmRandom-v0", "ElbowArmTasks-v0"] = "ElbowArm-v0"
+    env: EnvironmentId = "ElbowArm-v0"
     """Gymnasium id of the environment."""
     elbows: Elbows = None
     """Elbows on the table: a number up to 2 as in the paper, or the joints' numbers, such as 4 or 4,7; those of the

@@ -12,7 +12,7 @@ import signal
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
 import ray
@@ -81,9 +81,8 @@ class Cluster(Pool):
 
     def __init__(self, address: str, workers: int, cpus: int, retries: int) -> None:
         super().__init__()
-        self._own = not ray.is_initialized()
-        if self._own:
-            _connect(address, workers)
+        self._connected = ExitStack()
+        self._connected.enter_context(connection(address, workers))
         # Beside this process, so that no other machine's end takes it along; a call for each worker waits in it.
         here = NodeAffinitySchedulingStrategy(ray.get_runtime_context().get_node_id(), soft=True)
         board = ray.remote(num_cpus=0, max_concurrency=10_000, scheduling_strategy=here)(Board)
@@ -107,8 +106,7 @@ class Cluster(Pool):
                 time.sleep(0.1)
         else:
             self._end(stopped=False)
-        if self._own:
-            ray.shutdown()
+        self._connected.close()
 
     def _start(self, number: int, job: Job[Any]) -> Future[Any]:
         sent = self._do.remote(self._board, number, pickle.dumps(job)).future()
@@ -180,8 +178,19 @@ def _watch(board: Any) -> None:
         board.until_over.remote().future().add_done_callback(over)
 
 
-def _connect(address: str, workers: int) -> None:
-    """Joins a cluster, or starts one, with threads bounded as in processes, and with this process's signals kept."""
+@contextmanager
+def connection(address: str, workers: int) -> Iterator[None]:
+    """Joins a cluster, or starts one, and leaves it; nothing where this process is in one.
+
+    Threads are bounded as in processes, and this process's signals are kept.
+
+    Args:
+        address: the cluster's; "local" to start one on this machine, which ends with the block.
+        workers: CPUs of a cluster that is started.
+    """
+    if ray.is_initialized():
+        yield
+        return
     options: dict[str, Any] = {}
     if address == "local":
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
@@ -194,6 +203,10 @@ def _connect(address: str, workers: int) -> None:
             logging_level="error",
             runtime_env={"env_vars": {name: os.environ.get(name, "1") for name in ONE_THREAD}},
         )
+    try:
+        yield
+    finally:
+        ray.shutdown()
 
 
 @contextmanager

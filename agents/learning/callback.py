@@ -24,6 +24,10 @@ NEW: dict[str, Any] = {"steps": 0, "evaluated": -1, "training_seconds": 0.0, "wa
 """Progress of a run that has just begun."""
 
 
+class PausedError(Exception):
+    """A training has come as far as was asked for, and its checkpoint is written."""
+
+
 class Keeper(BaseCallback):
     """Evaluates by control periods, keeps the policy with the best return, and saves checkpoints by the clock.
 
@@ -32,9 +36,12 @@ class Keeper(BaseCallback):
         env: the batched environment under the model's.
         found: checkpoint that the run goes on from; None for a new run.
         tell: hears of the control periods that are made, and of each evaluation in a line.
+        until: control periods after which `PausedError` is raised; never when None.
     """
 
-    def __init__(self, run: Run, env: MeteredVectorEnv, found: Checkpoint | None, tell: Tell) -> None:
+    def __init__(
+        self, run: Run, env: MeteredVectorEnv, found: Checkpoint | None, tell: Tell, until: int | None = None
+    ) -> None:
         super().__init__()
         self._run, self._env, self._settings = run, env, Settings(**run.environment)
         progress = NEW if found is None else found.progress()
@@ -46,7 +53,7 @@ class Keeper(BaseCallback):
         if found is not None:
             self._best = run.files.restore_best(found)
             run.files.write_evaluations(self._rows)
-        self._tell, self._told = tell, 0
+        self._tell, self._told, self._until = tell, 0, until
 
     @property
     def best(self) -> Policy:
@@ -87,8 +94,11 @@ class Keeper(BaseCallback):
         every = self._run.settings.evaluate_every
         if self.num_timesteps // every > self._evaluated // every:
             self.evaluate(self.model)
-        if time.monotonic() - self._saved > self._run.checkpoint_seconds:
+        paused = self._until is not None and self.num_timesteps >= self._until
+        if paused or time.monotonic() - self._saved > self._run.checkpoint_seconds:
             self.checkpoint(self.model)
+        if paused:
+            raise PausedError
 
     def _on_rollout_end(self) -> None:
         self.show(self.num_timesteps)

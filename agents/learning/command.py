@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
 import tyro
-from tyro.conf import OmitArgPrefixes, subcommand
+from tyro.conf import OmitArgPrefixes, Positional, arg, subcommand
 
 from agents.cli import Count, Seed, spelled
 from agents.jobs.machines import Machines
@@ -23,6 +23,8 @@ from agents.tasks import RUNS
 
 if TYPE_CHECKING:
     from agents.learning.run import Run
+
+REQUIRED = "(required)"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +125,32 @@ def clone_command(words: Sequence[str]) -> Callable[..., None]:
             print(f"{result['name']}: {result['training_seconds']:.0f} s, return {result['best']['return']:.2f}")
 
     return clone
+
+
+def publish_command(words: Sequence[str]) -> Callable[..., None]:
+    """The command `publish`."""
+    del words
+
+    def publish(
+        runs: Annotated[tuple[Path, ...], Positional, arg(metavar="FOLDER [FOLDER ...]", help_behavior_hint=REQUIRED)],
+        /,
+        replace_seeds: bool = False,
+        allow_worse: bool = False,
+    ) -> None:
+        """Takes finished runs over into the shipped policies and learning curves; a task's best seed is its baseline.
+
+        Args:
+            runs: Folders of the runs, as the training named them.
+            replace_seeds: Whether to remove the shipped seeds of the same algorithm and task that are not among the
+                runs.
+            allow_worse: Whether a shipped policy may give way to one with a worse return; otherwise that is refused.
+        """
+        from agents.learning.publish import publish as publish_runs
+
+        for name in publish_runs(runs, replace_seeds=replace_seeds, allow_worse=allow_worse):
+            print(name)
+
+    return publish
 
 
 def runs_of(task: TaskOptions, schedule: Schedule, settings: AlgorithmSettings, command: str) -> list[Run]:

@@ -29,7 +29,7 @@ SEED_STRIDE = 1_000_000
 """Arm i of a run with seed s draws from seed s * SEED_STRIDE + i: no two runs share an arm, nor an evaluation's."""
 
 
-def train(run: Run, resume: bool = False, tell: Tell = lambda *_: None) -> dict[str, Any]:
+def train(run: Run, resume: bool = False, tell: Tell = lambda *_: None, until: int | None = None) -> dict[str, Any]:
     """Trains one seed; Ctrl-C ends it and keeps the best policy so far.
 
     Writes what `RunFolder` lists: the best policy each time an evaluation improves, a row per evaluation, a checkpoint
@@ -40,6 +40,8 @@ def train(run: Run, resume: bool = False, tell: Tell = lambda *_: None) -> dict[
         resume: go on from the folder's latest checkpoint that is whole; a run that has made all its steps is left
             alone. Without a checkpoint it starts anew.
         tell: hears of the control periods that are made, and of each evaluation in a line.
+        until: control periods after which the training pauses, with a checkpoint from which it goes on to the same
+            bits; it is trained to its end when None.
 
     Returns:
         Name, seed, control periods and seconds of the run, and the metrics of its best evaluation; those are None
@@ -52,7 +54,7 @@ def train(run: Run, resume: bool = False, tell: Tell = lambda *_: None) -> dict[
     """
     from stable_baselines3.common.vec_env import VecMonitor
 
-    from agents.learning.callback import Keeper
+    from agents.learning.callback import Keeper, PausedError
     from agents.learning.training_env import MeteredVectorEnv
     from elbow_gym.sb3 import SB3VecEnv
 
@@ -75,8 +77,8 @@ def train(run: Run, resume: bool = False, tell: Tell = lambda *_: None) -> dict[
         # One more than is kept lies there while it is written.
         check_space(files.path.parent, (1 + KEPT) * buffer_size(model))
         files.open(run.record(), resume)
-        keeper = Keeper(run, env, found, tell)
-        begun = found is not None
+        keeper = Keeper(run, env, found, tell, until)
+        begun, paused = found is not None, False
         try:
             if not begun:
                 _prepare(run, model, env, keeper)
@@ -84,10 +86,12 @@ def train(run: Run, resume: bool = False, tell: Tell = lambda *_: None) -> dict[
             env.staggered = True
             remaining = total - model.num_timesteps
             model.learn(remaining, callback=keeper, log_interval=run.settings.log_interval, reset_num_timesteps=False)
+        except PausedError:
+            paused = True
         except KeyboardInterrupt:
             forget_lost_terminal()
             print(f"{run.name}: interrupted; keeping the best policy so far", file=sys.stderr)
-        if begun:
+        if begun and not paused:
             keeper.finish(model)
     training, wall = keeper.seconds
     result = {
@@ -100,7 +104,8 @@ def train(run: Run, resume: bool = False, tell: Tell = lambda *_: None) -> dict[
         "wall_seconds": round(wall, 1),
         "best": keeper.best.card.evaluation if begun else None,
     }
-    files.write_result(result)
+    if not paused:
+        files.write_result(result)
     return result
 
 
@@ -176,7 +181,7 @@ def train_all(runs: Sequence[Run], machines: Machines | None = None, resume: boo
         run.files.check(run.record(), resume)
     for run in runs:
         check_writable(run.folder)
-    compile_before(_batches(runs))
+    compile_before(batches(runs))
     apart = machines.ray is not None or min(machines.workers or cores(), len(runs)) > 1
     with Bar(sum(run.settings.total_timesteps for run in runs), "step") as bar:
         outcomes = _side_by_side(runs, machines, bar) if apart else _one_by_one(runs, resume, bar)
@@ -190,7 +195,7 @@ def train_all(runs: Sequence[Run], machines: Machines | None = None, resume: boo
     return outcomes
 
 
-def _batches(runs: Sequence[Run]) -> list[tuple[Settings, int] | Settings]:
+def batches(runs: Sequence[Run]) -> list[tuple[Settings, int] | Settings]:
     """Environments of the runs' trainings and evaluations, for `compile_before`."""
     trained = [(Settings(**run.environment), run.settings.num_envs) for run in runs]
     return [one for settings, arms in trained for one in ((settings, arms), settings)]

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from agents.evaluation.interquartile import Estimate
 from agents.evaluation.metrics import UNITS
 from agents.files import write_csv
 from agents.style import elbow_name, look
 from benchmarks.energy.cells import featured
-from benchmarks.energy.statistics import Estimate
 
 if TYPE_CHECKING:
     from benchmarks.energy.rows import Row

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from benchmarks.energy.statistics import Estimate
+from agents.evaluation.interquartile import Estimate
 
 
 @dataclass(frozen=True)

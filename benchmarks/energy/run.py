@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from agents.evaluation.guest import Guest
+from agents.evaluation.interquartile import center, interquartile_mean
 from agents.evaluation.metrics import REGIMES, UNITS
 from agents.evaluation.player import Player
 from agents.evaluation.players import ELBOW_COUNTS
@@ -33,7 +34,6 @@ from benchmarks.energy import markdown as energy_table
 from benchmarks.energy.cache import Results
 from benchmarks.energy.cells import PARTS, Cell, cells, guest_cells, own_arm_cells, players, sweep, work
 from benchmarks.energy.rows import Row
-from benchmarks.energy.statistics import center, interquartile_mean
 from benchmarks.machine import CACHE, LATEST, PACKAGES, RESULTS
 from benchmarks.optimal import Cell as Bound
 from benchmarks.optimal import cached as cached_bound

@@ -12,6 +12,7 @@ import pytest
 
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import OpenLoop, Trajectory
+from agents.evaluation.interquartile import interquartile_mean
 from agents.evaluation.metrics import REGIMES, UNITS
 from agents.evaluation.players import ELBOW_COUNTS
 from agents.evaluation.receipt import read_receipt
@@ -24,7 +25,6 @@ from agents.shipped.seeds import load_policy, shipped_policies
 from agents.style import CONTROLLER_NAMES
 from benchmarks.energy import breakdown, pareto
 from benchmarks.energy import cells as lineup
-from benchmarks.energy.statistics import interquartile_mean
 from benchmarks.machine import RESULTS
 from benchmarks.optimal import DEFAULT_WEIGHT, FRONT_WEIGHTS, Cell, cached, cells, files
 from elbow_gym import ElbowArmEnv

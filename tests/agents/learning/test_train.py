@@ -169,6 +169,18 @@ def test_interrupted_run_keeps_its_best_policy_and_goes_on(tmp_path, monkeypatch
     assert train(small_run(tmp_path / "run"), resume=True)["finished"]
 
 
+def test_run_that_pauses_goes_on_to_the_same_policy(done, tmp_path):
+    run = small_run(tmp_path / "run")
+    for until, reached in ((300, 512), (300, 512), (600, 768)):
+        assert (train(run, resume=True, until=until)["steps"], run.files.result()) == (reached, None)
+    assert train(run, resume=True)["finished"]
+    assert [row[:1] + row[3:] for row in evaluations(run.folder)] == [
+        row[:1] + row[3:] for row in evaluations(done[0].folder)
+    ]
+    for name, whole in weights(done[0].folder).items():
+        np.testing.assert_array_equal(weights(run.folder)[name], whole)
+
+
 def test_finished_run_is_left_alone(done, monkeypatch):
     monkeypatch.setattr("agents.learning.callback.Keeper", None)
     assert train(done[0], resume=True) == done[1]

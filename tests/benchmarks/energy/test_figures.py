@@ -2,11 +2,11 @@
 
 import pytest
 
+from agents.evaluation.interquartile import Estimate
 from agents.evaluation.metrics import REGIMES, UNITS
 from agents.style import pyplot
 from benchmarks.energy.figures import LEAST_SPAN, figure
 from benchmarks.energy.rows import Row
-from benchmarks.energy.statistics import Estimate
 
 
 @pytest.mark.slow

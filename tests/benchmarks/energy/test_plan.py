@@ -8,11 +8,11 @@ import pytest
 from PIL import Image
 from scipy import stats
 
+from agents.evaluation.interquartile import CONFIDENCE, RESAMPLES, interquartile_mean
 from agents.evaluation.regimes import BENCHMARK_SEEDS
 from benchmarks.energy import run
 from benchmarks.energy.cells import Cell, cells, players
 from benchmarks.energy.run import LQR_ARMS, Plan, batches, energy, measure, plan
-from benchmarks.energy.statistics import CONFIDENCE, RESAMPLES, interquartile_mean
 from benchmarks.machine import LATEST, LATEST_SPEED, RESULTS
 
 

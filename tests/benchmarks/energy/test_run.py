@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from agents.evaluation import players
+from agents.evaluation.interquartile import interquartile_mean
 from agents.evaluation.recording import record
 from agents.evaluation.regimes import SHIFTED
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES
@@ -16,7 +17,6 @@ from benchmarks.energy import cells as lineup
 from benchmarks.energy import run as energy
 from benchmarks.energy.cells import Cell
 from benchmarks.energy.run import Plan
-from benchmarks.energy.statistics import interquartile_mean
 from elbow_gym.baselines.pd import CLIPPED, PDController
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv

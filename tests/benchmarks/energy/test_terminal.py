@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
+from agents.evaluation.interquartile import Estimate
 from agents.evaluation.metrics import REGIMES, UNITS
 from agents.style import CONTROLLER_NAMES
 from benchmarks.energy.cells import FEATURED
 from benchmarks.energy.markdown import percent, short, significant
 from benchmarks.energy.rows import Row
-from benchmarks.energy.statistics import Estimate
 from benchmarks.energy.terminal import WIDTH, meaning, report, table
 
 
