@@ -76,7 +76,9 @@ def perform(job: Job[T], send: Send) -> T:
 
     def tell(units: int, line: str = "") -> None:
         nonlocal done, sent, last
-        _stay_wanted()
+        # Work that ends in good order has more to say.
+        if not line:
+            _stay_wanted()
         done += units
         now = time.monotonic()
         if line or now - last >= TELL_PERIOD:

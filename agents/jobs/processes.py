@@ -20,6 +20,7 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Variables of the environment that say how many threads a process's linear algebra takes."""
 ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 """Signals that ask a process to end."""
+ENDED = 'a worker process ended by itself (a script needs `if __name__ == "__main__":` around what it does)'
 _STARTING = threading.Lock()
 """Held while a process starts, which inherits what this one's environment has meanwhile."""
 
@@ -76,9 +77,12 @@ class Processes(Pool):
         for left in reversed(range(1 + self._retries)):
             with contextlib.suppress(BrokenProcessPool):
                 return self._submit(number, job).result()
-            self._own.executor = None
+            self._own.executor, process = None, self._own.process
             if self._end.closed:
                 raise InterruptedError("stopped")
+            process.join()
+            if process.exitcode >= 0:
+                raise ChildProcessError(f"{ENDED}, with exit code {process.exitcode}")
             if left:
                 self._notices.append((number, 0, restarted(job)))
         raise ChildProcessError(KILLED)
@@ -88,10 +92,12 @@ class Processes(Pool):
             return self._own.executor.submit(_do, number, job)
         mine, its = self._context.Pipe(duplex=False)
         with _STARTING, _as_children_start():
+            before = multiprocessing.active_children()
             self._own.executor = ProcessPoolExecutor(1, self._context, _meet_parent, (its, self._life))
             self._executors.append(self._own.executor)
             self._pipes.append(mine)
             future = self._own.executor.submit(_do, number, job)
+            [self._own.process] = [one for one in multiprocessing.active_children() if one not in before]
         # The process has its copy: with this one open, its death would not end the pipe.
         its.close()
         return future

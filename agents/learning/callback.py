@@ -78,7 +78,10 @@ class Keeper(BaseCallback):
         """Tells how many control periods are made. KeyboardInterrupt where the run is `unwanted`."""
         if unwanted():
             raise KeyboardInterrupt
-        self._tell(steps - self._told)
+        try:
+            self._tell(steps - self._told)
+        except InterruptedError as error:
+            raise KeyboardInterrupt from error
         self._told = steps
 
     def _on_step(self) -> bool:

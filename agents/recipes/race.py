@@ -6,8 +6,9 @@ import argparse
 import inspect
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,13 +118,19 @@ def clocks() -> tuple[float, float]:
     return time.process_time(), time.monotonic()
 
 
-def main(train: Callable[..., Any], steps: int, algorithms: Sequence[str] = ()) -> None:
+def main(
+    train: Callable[..., Any],
+    steps: int,
+    algorithms: Sequence[str] = (),
+    options: Mapping[str, Any] = MappingProxyType({}),
+) -> None:
     """Command line of a recipe: trains, prints every evaluation and the verdict.
 
     Args:
         train: takes steps, seed and an `AfterUpdate`.
         steps: length of the training where the command line gives none [control periods].
         algorithms: names that `train` takes as `algorithm`, the first by default; none when it takes no such argument.
+        options: further arguments that `train` takes, with their defaults.
     """
     parser = argparse.ArgumentParser(description=inspect.getdoc(train))
     parser.add_argument("--steps", type=int, default=steps, help="length of the training, summed over all arms")
@@ -132,7 +139,10 @@ def main(train: Callable[..., Any], steps: int, algorithms: Sequence[str] = ()) 
     parser.add_argument("--to-the-end", action="store_true", help="go on after the PD is beaten")
     if algorithms:
         parser.add_argument("--algorithm", choices=algorithms, default=algorithms[0], help="algorithm of the library")
+    for name, default in options.items():
+        parser.add_argument(f"--{name}", type=type(default), default=default, help="see the recipe")
     given = parser.parse_args()
     race = Race(given.every, stop=not given.to_the_end)
-    train(given.steps, given.seed, race, **({"algorithm": given.algorithm} if algorithms else {}))
+    more = {name: getattr(given, name) for name in (*options, *(["algorithm"] if algorithms else []))}
+    train(given.steps, given.seed, race, **more)
     print(race.verdict())

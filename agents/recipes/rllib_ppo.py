@@ -1,7 +1,8 @@
 """RLlib's PPO, new API stack, on the native batch.
 
 Pinned: ray[rllib] 2.60.0, gymnasium 1.2.2 (which RLlib demands), torch 2.13.0.
-`python -m agents.recipes.rllib_ppo`
+`python -m agents.recipes.rllib_ppo`, with `--runners 4` in four processes beside the learner's, and with
+`--address auto` on the cluster that `ray_cluster.yaml` starts.
 
 Unmodified, with `gym_env_vectorize_mode="vector_entry_point"`. Leave `autoreset_mode` at its default, "NextStep":
 RLlib takes the observation after an episode's end for the next episode's first. Given "SameStep" it takes the new
@@ -44,15 +45,33 @@ class QuietModule(DefaultPPOTorchRLModule):
         nn.init.zeros_(last.bias)
 
 
-def train(steps: int = 1_000_000, seed: int = 0, after_update: AfterUpdate = lambda *_: False) -> Any:
-    """Trains RLlib's PPO."""
-    ray.init(num_cpus=1, include_dashboard=False, log_to_driver=False, ignore_reinit_error=True)
+def train(
+    steps: int = 1_000_000,
+    seed: int = 0,
+    after_update: AfterUpdate = lambda *_: False,
+    runners: int = 0,
+    address: str = "local",
+) -> Any:
+    """Trains RLlib's PPO.
+
+    Args:
+        steps: length of the training [control periods], summed over all arms.
+        seed: seed of the environment and the networks.
+        after_update: called after each update.
+        runners: processes that step a native batch each, `NUM_ENVS` arms together; the learner's own when 0. An update
+            sees as many control periods either way, of other random numbers.
+        address: cluster of Ray; one with a CPU for each runner is started here when "local".
+    """
+    if NUM_ENVS % max(runners, 1):
+        raise ValueError(f"runners must divide {NUM_ENVS}, got {runners}")
+    mine = {"num_cpus": 1 + runners, "include_dashboard": False} if address == "local" else {}
+    ray.init(address, **mine, log_to_driver=False, ignore_reinit_error=True)
     config = (
         PPOConfig()
         .environment("elbow_gym:ElbowArm-v0", env_config={"start_noise": 0.1})
         .env_runners(
-            num_env_runners=0,
-            num_envs_per_env_runner=NUM_ENVS,
+            num_env_runners=runners,
+            num_envs_per_env_runner=NUM_ENVS // max(runners, 1),
             gym_env_vectorize_mode="vector_entry_point",
             rollout_fragment_length=PERIODS,
         )
@@ -101,4 +120,4 @@ def train(steps: int = 1_000_000, seed: int = 0, after_update: AfterUpdate = lam
 
 if __name__ == "__main__":
     torch.set_num_threads(1)
-    main(train, 1_000_000)
+    main(train, 1_000_000, options={"runners": 0, "address": "local"})

@@ -44,16 +44,20 @@ def test_work_that_fails_has_sent_how_far_it_came():
     assert sent == [(1, ""), (2, "")]
 
 
-def test_work_that_nobody_waits_for_ends_with_its_next_word(monkeypatch):
+def test_work_that_nobody_waits_for_ends_with_its_next_unit_and_may_say_what_became_of_it(monkeypatch):
     wanted = iter((False, False, True))
     monkeypatch.setattr(module, "unwanted", lambda: next(wanted))
-    done = []
+    done, sent = [], []
 
     def work(tell):
-        for k in range(3):
-            done.append(k)
-            tell(1)
+        try:
+            for k in range(3):
+                done.append(k)
+                tell(1)
+        finally:
+            tell(0, "stored")
 
     with pytest.raises(InterruptedError, match="another run failed or was interrupted"):
-        perform(Job(work, 3), lambda *_: None)
+        perform(Job(work, 3), lambda *message: sent.append(message))
     assert done == [0, 1]
+    assert sent[-1] == (1, "stored")

@@ -12,7 +12,7 @@ from agents.jobs import machines as module
 from agents.jobs.job import Job
 from agents.jobs.machines import HERE, Machines, do_all
 from agents.jobs.pool import KILLED
-from agents.jobs.processes import ONE_THREAD, Processes
+from agents.jobs.processes import ENDED, ONE_THREAD, Processes
 from tests.support import jobs as work
 from tests.support.workers import PoolHere, do_jobs_here
 
@@ -83,13 +83,17 @@ def test_killed_workers_take_no_other_job_along_and_their_own_goes_on_elsewhere(
     jobs = {
         "dies": Job(work.die, 1),
         "dies once": Job(partial(work.die_once, tmp_path / "died"), 4, "once"),
+        "leaves": Job(work.leave, 1, "leaver"),
         "lives": Job(work.surroundings, 1),
         "array": Job(partial(work.double, np.ones(3)), 1),
     }
     found = outcomes(Processes(2, retries=1), jobs, told)
     assert isinstance(found["dies"], ChildProcessError)
     assert str(found["dies"]) == KILLED
-    assert f"once: {KILLED}; it goes on from what it has stored" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f"once: {KILLED}; it goes on from what it has stored" in said
+    assert "leaver" not in said
+    assert str(found["leaves"]) == f"{ENDED}, with exit code 3"
     assert sum(told) == 4
     np.testing.assert_array_equal(found["array"], np.full(3, 2.0))
     threads, blocked, process = found["lives"]

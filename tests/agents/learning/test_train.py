@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,6 +26,7 @@ from stable_baselines3 import PPO
 from tqdm import tqdm
 
 from agents.jobs.bar import Bar
+from agents.jobs.job import Job, perform
 from agents.jobs.machines import Machines
 from agents.learning.callback import Keeper
 from agents.learning.checkpoint import running
@@ -255,6 +257,14 @@ def test_run_that_nobody_waits_for_any_more_stops(monkeypatch, tmp_path):
     result = train(run)
     assert (result["finished"], result["steps"]) == (False, 4)
     assert run.files.best() is not None
+
+
+def test_run_in_a_worker_that_nobody_waits_for_any_more_stores_what_it_has(monkeypatch, tmp_path):
+    run = small_run(tmp_path / "run")
+    monkeypatch.setattr("agents.jobs.job.unwanted", lambda: run.files.best() is not None)
+    result = perform(Job(partial(train, run), 1024), lambda *_: None)
+    assert (result["finished"], result["best"] is None) == (False, False)
+    assert run.files.checkpoint().progress()["steps"] == result["steps"] > 0
 
 
 def test_run_goes_on_where_its_terminal_is_gone(tmp_path, monkeypatch):
