@@ -262,7 +262,7 @@ def test_run_that_nobody_waits_for_any_more_stops(monkeypatch, tmp_path):
 def test_run_in_a_worker_that_nobody_waits_for_any_more_stores_what_it_has(monkeypatch, tmp_path):
     run = small_run(tmp_path / "run")
     monkeypatch.setattr("agents.jobs.job.unwanted", lambda: run.files.best() is not None)
-    result = perform(Job(partial(train, run), 1024), lambda *_: None)
+    result = perform(Job(partial(train, run, True), 1024), lambda *_: None)
     assert (result["finished"], result["best"] is None) == (False, False)
     assert run.files.checkpoint().progress()["steps"] == result["steps"] > 0
 
