@@ -33,8 +33,9 @@ FRONT_WEIGHTS = (0.0002, 0.002, 0.005)
 ELBOW_COUNTS = (2, 0, 1)
 MAKER = "python -m benchmarks optimal"
 
-STEPPING = ("timestep", "integrator")
-"""Arguments of an environment that say how it is simulated."""
+ASIDE = ("timestep", "integrator", "start_spread", "task_observation")
+"""Arguments of an environment that its program does not know: it has a mesh and a start of its own, and observes
+nothing."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +75,7 @@ class Cell:
     def question(self) -> dict[str, Any]:
         """Question in JSON types; a stored result is used only where its question is the same."""
         problem = self.problem
-        # The program has a mesh of its own: it knows neither of these.
-        asked = {name: value for name, value in problem.settings.arguments.items() if name not in STEPPING}
+        asked = {name: value for name, value in problem.settings.arguments.items() if name not in ASIDE}
         return json.loads(json.dumps({**asked, "above_table": problem.above_table}))
 
 

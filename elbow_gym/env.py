@@ -91,7 +91,7 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
 
     The paper's start pose (or, with `start="on_target"`, the pose with the hand on the circle) at rest without
     current, plus normal noise of `start_noise` rad per joint, projected onto the elbows' plane. `start_spread` draws
-    poses within so many rad of every joint's angle there, with every joint and the hand at z >= 0.
+    poses within so many rad of the paper's in every joint, with every joint and the hand at z >= 0.
     `reset(options={"state": {"q": ..., "q_dot": ..., "current": ...}, "phase": ...})` sets it exactly; the options
     `circle` and `parameters` (dicts) replace what would be drawn.
 
@@ -115,7 +115,7 @@ class ElbowArmEnv(  # pyright: ignore[reportIncompatibleVariableOverride]
     | action_unit | "fraction" | "fraction" of the supply voltage, or "volt" |
     | start | "paper" | "paper" or "on_target" |
     | start_noise | 0.02 | standard deviation of the start pose [rad] |
-    | start_spread | 0.0 | largest difference of a joint from the start pose [rad], drawn with every joint at z >= 0 |
+    | start_spread | 0.0 | largest difference of a joint from the paper's pose [rad], drawn with all joints at z >= 0 |
     | circle | None | dict of center, radius, period, plane, tilt, phase, shape...; ranges or "random" are drawn |
     | tracking_weight | 1.0 | cost per metre of tracking error |
     | energy_weight | 0.001 | cost per watt of electrical power |

@@ -16,6 +16,8 @@ from elbow_gym.parameters import ArmParameters, Array
 NEWTON_ROUNDS = 50
 NEWTON_TOLERANCE = 1e-12
 """Height at which an elbow counts as on the table [m]."""
+LARGEST_TURN = 0.3
+"""Largest turn of a link in a step towards a point [rad]."""
 
 
 def pitches(q: ArrayLike) -> Array:
@@ -75,6 +77,46 @@ def on_table(arm: ArmParameters, q: ArrayLike, elbows: Sequence[int]) -> Array:
         q = q - np.diff(turn, prepend=0.0)
         height = elbow_heights(arm, q, elbows)
     raise ValueError(f"elbows must be able to lie on the table, got heights {height} m after {NEWTON_ROUNDS} rounds")
+
+
+def reaching_pose(arm: ArmParameters, q: ArrayLike, elbows: Sequence[int], position: ArrayLike) -> Array:
+    """The pose with the hand at a point and the elbows at z = 0 [rad], shape (n,), that changes pitches least.
+
+    Newton's method in the pitches, in steps of at most `LARGEST_TURN`. Joints that would be below the table are held at
+    z = 0, too.
+
+    Args:
+        arm: the arm.
+        q: pose to start from [rad], shape (n,).
+        elbows: joint numbers held at z = 0.
+        position: the hand's point [m], shape (3,).
+
+    Raises:
+        ValueError: it finds none.
+    """
+    start, held, length = np.array(q, dtype=np.float64), set(elbows), arm.of_links("length")
+    x, y, z = np.asarray(position, dtype=np.float64)
+    start[0] = np.arctan2(y, x)
+    while True:
+        q, missing = start, np.zeros(0)
+        before = np.tri(arm.n_joints)[[joint - 2 for joint in (*sorted(held), arm.n_joints + 1)]]
+        for _ in range(NEWTON_ROUNDS):
+            across, along = length * np.sin(pitches(q)), length * np.cos(pitches(q))
+            missing = np.append(before @ along, across.sum()) - [*[0.0] * len(held), z, np.hypot(x, y)]
+            if np.abs(missing).max() < NEWTON_TOLERANCE:
+                break
+            turn = np.linalg.pinv(np.vstack([before * -across, along])) @ missing
+            q = q - np.diff(turn * min(1.0, LARGEST_TURN / np.abs(turn).max()), prepend=0.0)
+        else:
+            raise ValueError(
+                f"position must be within the hand's reach with joints {sorted(held)} on the table, got {position} "
+                f"{np.abs(missing[-2:]).max():.3g} m away after {NEWTON_ROUNDS} rounds"
+            )
+        height = joint_positions(arm, q)[2:-1, 2]
+        low = {int(k) + 3 for k in np.flatnonzero(height < -NEWTON_TOLERANCE)} - held
+        if not low:
+            return q
+        held |= low
 
 
 def radii(arm: ArmParameters, q: ArrayLike, joints: Sequence[int]) -> Array:

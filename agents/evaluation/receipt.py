@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from agents.evaluation.regimes import Results, in_all_regimes
 from agents.machine import code, machine, versions
 from agents.tasks import plain_arguments
 from elbow_gym.checks import is_finite
+from elbow_gym.task.settings import Settings
 
 TOLERANCE = 1e-6
 """Largest difference of an episode's energy between machines, over the energy or 1 J, whichever is more [-]."""
@@ -121,9 +123,11 @@ def player_again(given: Mapping[str, Any], trust: bool = False) -> Player:
     if given["player"] != player.identity:
         raise ValueError(f"player of the receipt must have the digest {given['player']}, got {player.identity}")
     own = plain_arguments(player.settings)
+    # A receipt from before an argument was there has its default.
+    told = {**{field.name: field.default for field in fields(Settings)}, **given["settings"]}
     for name in {**given["settings"], **own}:
-        if given["settings"].get(name) != own.get(name):
-            raise ValueError(f"{name} of the receipt must be {own.get(name)} here, got {given['settings'].get(name)}")
+        if told[name] != own.get(name):
+            raise ValueError(f"{name} of the receipt must be {own.get(name)} here, got {told[name]}")
     return player
 
 

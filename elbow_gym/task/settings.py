@@ -55,12 +55,13 @@ class Settings:
     action_unit: str = "fraction"
     """Unit of the actions: "fraction" of the supply voltage, in [-1, 1], or "volt"."""
     start: str = "paper"
-    """Start pose: "paper", the arm's nominal pose; "on_target", the pose whose hand is on the circle."""
+    """Start pose: "paper", the arm's nominal pose; "on_target", the pose whose hand is on the circle, by the yaw and
+    the last two links where these reach it."""
     start_noise: float = 0.02
     """Standard deviation of the start pose [rad], projected onto the elbows' plane."""
     start_spread: float = 0.0
-    """Largest difference of a joint's angle from the start pose's [rad]: uniform draws, put on the elbows' plane, until
-    every joint and the hand are at z >= 0."""
+    """Largest difference of a joint's angle from the paper's start pose [rad]: uniform draws, put on the elbows' plane,
+    until every joint and the hand are at z >= 0."""
     circle: Mapping[str, Any] | Circle | None = None
     """Dict of `Circle` fields, the paper's where one is missing; None: the paper's, or one in the reach of an arm that
     cannot follow it with its last two links."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from elbow_gym.checks import check_entries, require_entries
 from elbow_gym.kernel.rows import PARAMETERS
-from elbow_gym.kinematics import inverse_kinematics, pitches
+from elbow_gym.kinematics import inverse_kinematics, pitches, reaching_pose
 from elbow_gym.parameters import Array
 from elbow_gym.simulation.rates import Start
 from elbow_gym.simulation.state_checks import PLANE_TOLERANCE
@@ -91,8 +91,13 @@ def drawn_poses(
     if settings.start == "on_target":
         arms = population.arms(chosen) if moved else [simulator.arm] * len(chosen)
         for i, arm, circle in zip(chosen, arms, circles, strict=True):
-            q[i] = inverse_kinematics(arm, q[i], circle.position(float(circle.phase)))[0]
-    if settings.start_spread > 0.0:
+            target = circle.position(float(circle.phase))
+            try:
+                q[i] = inverse_kinematics(arm, q[i], target)[0]
+            except ValueError:
+                # The last two links do not reach everywhere that drawn circles may be.
+                q[i] = reaching_pose(arm, q[i], simulator.elbows, target)
+    elif settings.start_spread > 0.0:
         q = spread_poses(simulator, q, settings.start_spread, generators, chosen)
     if noise > 0.0:
         q[chosen] += noise * np.stack([generator.standard_normal(simulator.arm.n_joints) for generator in generators])

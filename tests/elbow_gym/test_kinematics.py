@@ -173,3 +173,26 @@ def test_nearest_turn_moves_joints_1_and_n_minus_1_alone_and_by_whole_turns():
     np.testing.assert_allclose(turned, [[turn - 3.1, 0.2, 9.0 - 2.0 * turn, 0.0], [1.0, 0.2, 3.1 - turn, 0.0]])
     near = q_d + 3.0
     assert kinematics.nearest_turn(q_d, near) is q_d
+
+
+@pytest.mark.parametrize("elbows", [(), (4,), (4, 7)])
+def test_reaching_pose_has_the_hand_at_the_point_the_elbows_down_and_no_joint_below(arm, elbows):
+    # Beyond and above what the last two links reach from the start pose.
+    for point in ((1.65, 1.75, 0.6), (0.0, 1.2, 0.7)):
+        q = kinematics.reaching_pose(arm, arm.nominal_pose, elbows, point)
+        np.testing.assert_allclose(kinematics.hand_position(arm, q), point, rtol=0.0, atol=1e-11)
+        np.testing.assert_allclose(kinematics.elbow_heights(arm, q, elbows), 0.0, atol=1e-11)
+        assert kinematics.joint_positions(arm, q)[:-1, 2].min() > -1e-11
+
+
+def test_reaching_pose_turns_links_no_more_than_another_that_reaches(arm):
+    point = kinematics.hand_position(arm, arm.nominal_pose) + np.array([0.0, 0.02, 0.01])
+    near = kinematics.reaching_pose(arm, arm.nominal_pose, (), point)
+    alone = kinematics.inverse_kinematics(arm, arm.nominal_pose, point)[0]
+    turned, more = (np.linalg.norm(kinematics.pitches(q) - kinematics.pitches(arm.nominal_pose)) for q in (near, alone))
+    assert 0.0 < turned < 0.8 * more
+
+
+def test_a_point_out_of_the_hands_reach_is_refused_with_the_distance(arm):
+    with pytest.raises(ValueError, match=r"^position must be within the hand's reach with joints \[4.*\] on the table"):
+        kinematics.reaching_pose(arm, arm.nominal_pose, (4,), (2.0, 2.0, 0.4))

@@ -202,3 +202,17 @@ def test_a_pose_that_cannot_be_spread_above_the_table_is_refused_with_the_reset(
 def test_evaluation_tasks_are_those_of_the_papers_elbow_counts(elbows):
     with pytest.raises(ValueError, match=r"^elbows must be 0, 1 or 2, got "):
         evaluation_tasks(elbows)
+
+
+@each_count
+def test_starts_on_the_target_have_the_hand_there_and_no_joint_below_the_table(elbows):
+    arms = gym.make_vec(ENV, num_envs=32, elbows=elbows, start="on_target")
+    _, infos = arms.reset(seed=0)
+    assert infos["tracking_error"].max() < 1e-10
+    arm, q = arms.unwrapped.episodes.arm, infos["start"]["q"]
+    assert joint_positions(arm, q)[:, 2:, 2].min() > -1e-8
+    # Joints 2 to 8 are the paper's where the last two links alone reach the circle, which here they mostly do.
+    moved = np.abs(q - arms.unwrapped.episodes.pose)[:, 1:8].max(axis=1) > 1e-9
+    assert 0 < moved.sum() < 16
+    one = gym.make(ENV, elbows=elbows, start="on_target")
+    np.testing.assert_array_equal(one.reset(seed=5)[1]["start"]["q"], q[5])

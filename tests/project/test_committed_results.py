@@ -14,8 +14,8 @@ from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import OpenLoop, Trajectory
 from agents.evaluation.interquartile import interquartile_mean
 from agents.evaluation.metrics import REGIMES, UNITS
-from agents.evaluation.players import ELBOW_COUNTS
-from agents.evaluation.receipt import read_receipt
+from agents.evaluation.players import ELBOW_COUNTS, find_player
+from agents.evaluation.receipt import player_again, read_receipt
 from agents.evaluation.regimes import BENCHMARK_SEEDS
 from agents.learning.evaluation import evaluation
 from agents.optimal.guesses import rollout
@@ -141,6 +141,7 @@ def test_receipts_of_the_pd_are_of_the_committed_figures():
     for elbows in ELBOW_COUNTS:
         receipt = read_receipt(str(RECEIPTS / f"pd_elbows{elbows}.json"))
         assert tuple(receipt["seeds"]) == BENCHMARK_SEEDS
+        assert player_again(receipt).settings == find_player("pd", elbows).settings
         for regime, joules in receipt["joules"].items():
             expected = float(by_key["pd", elbows, regime]["electrical_energy [J]"])
             assert interquartile_mean(joules).value == pytest.approx(expected, rel=1e-5)

@@ -72,13 +72,21 @@ def test_nan_on_a_receipt_is_no_agreement(line):
     ("changes", "message"),
     [
         ({"player": "0"}, "player of the receipt must have the digest 0, got "),
-        ({"settings": {}}, "elbows of the receipt must be 1 here, got None"),
+        ({"settings": {}}, "elbows of the receipt must be 1 here, got 2"),
         ({"what": "nobody"}, "player must be one of "),
     ],
 )
 def test_other_player_or_other_settings_are_refused(line, changes, message):
     with pytest.raises(ValueError, match=f"^{message}"):
         player_again(altered(line, **changes))
+
+
+def test_an_argument_that_a_receipt_does_not_know_has_its_default(line):
+    settings = dict(read_receipt(line)["settings"])
+    del settings["task_observation"]
+    player_again(altered(line, settings=settings))
+    with pytest.raises(ValueError, match=r"^more of the receipt must be None here, got 1$"):
+        player_again(altered(line, settings={**settings, "more": 1}))
 
 
 @pytest.mark.parametrize("word", ["nothing.json", "{", "[" * 100_000, "[]", '{"what": "pd"}'])
