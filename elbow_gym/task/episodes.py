@@ -92,7 +92,7 @@ class Episodes:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        take_over(self, self.population, self.targets, self.actuation, self.sensing, self._draws)
+        take_over(self, self.settings, self.population, self.targets, self.actuation, self.sensing, self._draws)
 
     @property
     def highest_action(self) -> float:

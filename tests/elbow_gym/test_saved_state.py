@@ -215,15 +215,18 @@ def arrived(thing):
 
 @pytest.mark.parametrize("arguments", [{}, RANDOM], ids=["plain", "random"])
 @pytest.mark.parametrize("kind", [ElbowArmEnv, ElbowArmVectorEnv])
-def test_an_environment_that_arrives_read_only_steps_and_resets(kind, arguments):
+def test_an_environment_that_arrives_read_only_steps_and_resets_and_compiles_nothing_again(kind, arguments):
     size = {"num_envs": 5} if kind is ElbowArmVectorEnv else {}
     env = played(kind(**size, **arguments))
+    entry = env.episodes.simulator._kernel.control_step
+    signatures = len(getattr(entry, "signatures", ()))
     there = arrived(env)
     act = ACTIONS if size else ACTIONS[:, 0]
     for one in act[:8]:
         assert same(there.step(one), env.step(one))
     assert same(there.reset(), env.reset())
     assert same(there.step(act[0]), env.step(act[0]))
+    assert len(getattr(entry, "signatures", ())) == signatures
 
 
 def test_a_simulator_that_arrives_read_only_steps_and_resets():
