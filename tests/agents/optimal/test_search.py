@@ -65,7 +65,7 @@ def test_a_solved_task_is_taken_from_the_store(solved):
 @pytest.mark.slow
 def test_a_task_nearby_is_solved_from_there_to_the_same_bound(solved):
     store, _, _, scratch, _ = solved
-    settings, said = Settings(**SHORT, payload=0.1, circle={"radius": 0.09}), []
+    settings, said = Settings(**SHORT, payload=0.03, circle={"radius": 0.095}), []
     near = optimal.bound(settings, store=store, progress=said.append)
     assert near.optimum.guess == "neighbour"
     assert len(said) < len(scratch)
