@@ -47,8 +47,8 @@ CONTROLLER_NAMES = {
     "sac_random": "SAC, drawn arms and circles",
     "receding_horizon": "receding horizon",
     "sampling_mpc": "sampling MPC",
-    "receding_horizon_payload": "receding horizon, payload estimated",
-    "sampling_mpc_payload": "sampling MPC, payload estimated",
+    "receding_horizon_payload": "receding horizon, adaptive",
+    "sampling_mpc_payload": "sampling MPC, adaptive",
 }
 CONTROLLER_MARKERS = {
     "pd_paper": "v",
