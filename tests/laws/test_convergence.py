@@ -9,28 +9,48 @@ from elbow_gym.simulation.step_limit import INTEGRATORS
 from tests.support.arms import ELBOWS, shortened, started, uneven_arm
 
 
-def end(elbows, timestep, integrator):
-    """Angles, rates and currents of the paper's arm after a tenth of a second under random voltages."""
+def run(elbows, timestep, integrator, duration=0.1):
+    """The paper's arm after some time under random voltages."""
     sim = Simulator("paper", elbows, timestep=timestep, integrator=integrator)
     voltage = started(sim, 1).uniform(-24.0, 24.0, 10)
-    sim.step(voltage, round(0.1 / timestep))
+    sim.step(voltage, round(duration / timestep))
+    return sim
+
+
+def state(sim):
+    """Angles, rates and currents."""
     return np.concatenate([sim.q[0], sim.q_dot[0], sim.current[0]])
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-@pytest.mark.parametrize("elbows", [*ELBOWS, (3, 5, 8)], ids=str)
-def test_halving_the_timestep_divides_the_error_by_sixteen(elbows, integrator):
-    ends = [end(elbows, timestep, integrator) for timestep in (2.5e-4, 6.25e-5, 1.5625e-5)]
+def joules(sim):
+    """Energies since the start [J], by motor."""
+    return np.concatenate([sim.electrical_energy[0], sim.copper_loss[0], sim.friction_loss[0], sim.link_work[0]])
+
+
+MOST_ELBOWS = (3, 5, 8)
+WHOLE = [("exponential", elbows, 2.5e-4, 0.1) for elbows in (*ELBOWS, MOST_ELBOWS)]
+SHORT = [("rk4", elbows, 1e-3, 0.01) for elbows in (0, 2, MOST_ELBOWS)]
+COMPILED = [pytest.param("rk4", *how, marks=pytest.mark.soak) for _, *how in WHOLE]
+
+
+@pytest.mark.parametrize(("integrator", "elbows", "longest", "duration"), [*WHOLE, *SHORT, *COMPILED])
+def test_halving_the_timestep_divides_the_error_by_sixteen(integrator, elbows, longest, duration):
+    ends = [state(run(elbows, longest / 4**k, integrator, duration)) for k in range(3)]
     coarse, fine = (np.linalg.norm(found - ends[-1]) for found in ends[:-1])
     # Two halvings; the finest run stands in for the exact one.
     assert 3.5 < np.log2(coarse / fine) / 2.0 < 4.6
 
 
-@pytest.mark.parametrize("elbows", ELBOWS, ids=str)
-def test_both_integrators_converge_to_the_same_run(elbows):
+BRIEF = [(elbows, 0.02) for elbows in (0, 2)]
+LONG = [pytest.param(elbows, 0.1, marks=pytest.mark.soak) for elbows in ELBOWS]
+
+
+@pytest.mark.parametrize(("elbows", "duration"), BRIEF + LONG)
+def test_both_integrators_converge_to_the_same_run(elbows, duration):
     # Both are off by less than 2e-10 at this step; a method of order 3 would be off by 5e-9.
-    exponential, classical = (end(elbows, 6.25e-5, integrator) for integrator in INTEGRATORS)
-    np.testing.assert_allclose(exponential, classical, rtol=0.0, atol=5e-10)
+    exponential, classical = (run(elbows, 6.25e-5, integrator, duration) for integrator in INTEGRATORS)
+    np.testing.assert_allclose(state(exponential), state(classical), rtol=0.0, atol=5e-10)
+    np.testing.assert_allclose(joules(exponential), joules(classical), rtol=0.0, atol=5e-9)
 
 
 # The longest step is one that only the exact decay of the currents allows.

@@ -131,8 +131,9 @@ def advanced(entries, rows, on):
     return state, summary
 
 
-def uncompiled_run(on):
-    return advanced(uncompiled(1, **on), SWITCHED_STATE_ROWS if any(on.values()) else STATE_ROWS, on)
+def uncompiled_run(on, exponential=True):
+    entries = uncompiled(1, exponential=exponential, **on)
+    return advanced(entries, SWITCHED_STATE_ROWS if any(on.values()) else STATE_ROWS, on)
 
 
 @pytest.mark.parametrize("on", SETS, ids=named)
@@ -149,10 +150,15 @@ def test_a_switch_that_has_nothing_to_do_changes_no_bit(on):
     assert losses["temperature_rise"] == losses["supply_loss"] == on["drive"]
 
 
+EXPONENTIAL = [pytest.param(on, True, id=named(on)) for on in SETS]
+CLASSICAL = [pytest.param(on, False, id=f"{named(on)}, classical") for on in (SETS[0], SETS[-1])]
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("lanes", [1, BLOCK_LANES])
-@pytest.mark.parametrize("on", SETS, ids=named)
-def test_every_kernel_compiles_to_the_bits_of_its_source(on, lanes):
+@pytest.mark.parametrize(("on", "exponential"), EXPONENTIAL + CLASSICAL)
+def test_every_kernel_compiles_to_the_bits_of_its_source(on, exponential, lanes):
     rows = SWITCHED_STATE_ROWS if any(on.values()) else STATE_ROWS
-    for found, expected_array in zip(advanced(kernel(lanes, **on), rows, on), uncompiled_run(on), strict=True):
-        np.testing.assert_array_equal(found, expected_array)
+    found = advanced(kernel(lanes, exponential=exponential, **on), rows, on)
+    for one, expected_array in zip(found, uncompiled_run(on, exponential), strict=True):
+        np.testing.assert_array_equal(one, expected_array)

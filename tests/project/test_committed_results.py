@@ -119,6 +119,7 @@ LQR = [
 """The same; the LQR takes half a second for each, so that the front's are soak."""
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("cell", SOLVED)
 def test_committed_voltages_repeat_their_cost_in_the_steps_that_they_were_found_in(cell):
     figures, trajectory = cached(cell), Trajectory.load(files(cell)[1])

@@ -22,8 +22,13 @@ def uncompiled(lanes, **switches):
 
 
 def shared(lanes, exponential=True, **switches):
-    """The plain kernel, or for any switches the one with all of them: the same bits, and two to compile of eight."""
-    return kernel(lanes, exponential=exponential, **(EVERYTHING if any(switches.values()) else {}))
+    """The plain kernel, or for any switches the one with all of them: the same bits, and two to compile of eight.
+
+    Of the classical method the plain Python of its own, which suits a few hundred steps.
+    """
+    if not exponential:
+        return uncompiled(lanes, exponential=False, **switches)
+    return kernel(lanes, **(EVERYTHING if any(switches.values()) else {}))
 
 
 def states(q, q_dot, current):

@@ -23,6 +23,7 @@ def error_of(true, family, integrator, substeps, arms=1):
     return errors(outcome(Trial(family, integrator, arms, substeps)), true)
 
 
+@pytest.mark.soak
 def test_both_integrators_agree_on_the_reference(true):
     assert max(errors(truth("rk4"), true)) < 1e-10
 
@@ -43,7 +44,10 @@ def test_the_first_period_of_the_reference_is_that_of_the_printed_equations():
     np.testing.assert_allclose(run.state().ravel(), exact, rtol=0.0, atol=1e-8)
 
 
-@pytest.mark.parametrize(("integrator", "arms"), [("exponential", 1), ("rk4", 1), (GROWING, 1), (GROWING, 3)])
+@pytest.mark.parametrize(
+    ("integrator", "arms"),
+    [("exponential", 1), pytest.param("rk4", 1, marks=pytest.mark.soak), (GROWING, 1), (GROWING, 3)],
+)
 def test_halving_the_steps_of_this_project_divides_the_error_by_sixteen(true, integrator, arms):
     coarse, fine = (error_of(true, OURS, integrator, count, arms)[0] for count in (80, 160))
     assert 3.7 < np.log2(coarse / fine) < 5.0

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from gymnasium.utils import performance
 
-from benchmarks.speed import environments, markdown, peers
+from benchmarks.speed import environments, markdown, peers, precision
 from benchmarks.speed import own as contenders
 from benchmarks.speed import run as speed
 from benchmarks.speed.rows import Row, ratios
@@ -32,15 +32,16 @@ def small_batches(monkeypatch):
     monkeypatch.setattr(environments, "VECTOR_ARMS", 32)
 
 
-@pytest.fixture
-def no_batch_of_rk4(monkeypatch):
-    """Batches take exponential steps alone, since no other test compiles the kernel of their classical ones."""
-    step = contenders._step
+@pytest.fixture(params=[False, pytest.param(True, marks=pytest.mark.soak)], ids=["exponential steps", "all steps"])
+def classical_steps(request, monkeypatch):
+    """Whether what takes classical steps does: no other test compiles their kernels."""
 
-    def exponential(joints, elbows, arms, unit=contenders.RK4_STEP, **how):
-        return step(joints, elbows, arms, unit if arms == 1 else contenders.EXPONENTIAL_STEP, **how)
+    def exponential(*given, integrator, **how):
+        return Simulator(*given, **how)
 
-    monkeypatch.setattr(contenders, "_step", exponential)
+    if not request.param:
+        monkeypatch.setattr(contenders, "OWN_STEPS", dict.fromkeys(contenders.OWN_STEPS, "exponential"))
+        monkeypatch.setattr(precision, "Simulator", exponential)
 
 
 @pytest.fixture
@@ -53,7 +54,7 @@ def no_peers(monkeypatch):
 @pytest.mark.skipif(
     not hasattr(performance, "benchmark_vector_step"), reason="this Gymnasium has no benchmark_vector_step"
 )
-@pytest.mark.usefixtures("quick_starts", "small_batches", "no_batch_of_rk4", "no_peers")
+@pytest.mark.usefixtures("quick_starts", "small_batches", "classical_steps", "no_peers")
 def test_quick_run_writes_all_own_rows_and_names_missing_peers(tmp_path, capsys, monkeypatch):
     # Copies in processes of their own are slow to start, and Gymnasium's business. Two threads of a network spin while
     # they wait for each other, here and in whatever later tests train.

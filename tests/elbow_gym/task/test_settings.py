@@ -11,7 +11,6 @@ import pytest
 from elbow_gym import Circle, paper_arm
 from elbow_gym.task.episodes import Episodes
 from elbow_gym.task.settings import Settings
-from tests.support.kernel_calls import uncompiled
 
 POSITIVE = ("control_frequency", "timestep", "duration", "voltage_limit")
 NON_NEGATIVE = ("start_noise", "tracking_weight", "energy_weight")
@@ -126,14 +125,13 @@ def test_ten_kilohertz_control_makes_one_step_of_a_tenth_of_a_millisecond():
     assert Settings(control_frequency=10_000.0).substeps == pytest.approx([1e-4], rel=1e-15)
 
 
-def test_default_steps_grow_after_the_voltages_jump_to_the_longest_that_the_fastest_rate_allows(monkeypatch):
+def test_default_steps_grow_after_the_voltages_jump_to_the_longest_that_the_fastest_rate_allows():
     settings = Settings()
     assert settings.timestep is None
     # 0.6, 1.2, 1.8 and 2.2 over (D + D_m) / J = 400 1/s.
     # Five seconds warm a winding by 106 K at most, 1.42 times its resistance; in the end it would be 3.7 times.
     warm = [Settings(integrator="rk4", heat=True, duration=duration).substeps.size for duration in (5.0, 5e3)]
     assert [Settings(integrator="rk4").substeps.size, *warm] == [13, 18, 47]
-    monkeypatch.setattr("elbow_gym.simulator.kernel", uncompiled)
     assert Episodes(Settings(integrator="rk4", heat=True)).simulator.timestep == pytest.approx(0.02 / 18)
     assert settings.substeps == pytest.approx([0.0015, 0.003, 0.0045, 0.0055, 0.0055], rel=1e-3)
     assert settings.substeps.sum() == pytest.approx(0.02, rel=1e-15)
