@@ -75,3 +75,14 @@ def made_by_id(_):
     env = gym.make("elbow_gym:ElbowArm-v0")
     env.reset(seed=0)
     return float(env.step(np.zeros(10, dtype=np.float32))[1])
+
+
+def first_step(_):
+    """CPU time of the first control period of a batch, with the compilation of its kernel where there is none [s]."""
+    from elbow_gym.vector_env import ElbowArmVectorEnv
+
+    begun = time.process_time()
+    env = ElbowArmVectorEnv(16)
+    env.reset(seed=0)
+    env.step(np.zeros((16, 10), dtype=np.float32))
+    return time.process_time() - begun

@@ -78,3 +78,11 @@ def test_local_cluster_does_what_processes_do(tmp_path, capsys):
     assert sum(told) == 5
     assert outcomes == {"0": None, "1": None, "2": None}
     assert ended == [True, True, False]
+
+
+@pytest.mark.soak
+@pytest.mark.filterwarnings("ignore")
+def test_workers_of_a_machine_compile_a_kernel_once(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    taken = sorted(ends_of({k: Job(work.first_step, 1) for k in range(2)}, []).values())
+    assert 2.0 * taken[0] < taken[1]

@@ -184,7 +184,9 @@ def test_ctrl_c_keeps_the_best_policies_and_leaves_no_worker(tmp_path, kind, who
         assert f"{name}: not finished after " in out, out
     until(lambda: not any(alive(pid) for pid in others))
     resumed = started(tmp_path, kind, "--resume")
-    assert resumed.communicate(timeout=PATIENCE)[0].count(": finished after 40,960 steps") == 2
+    # Whoever is stopped between two rollouts ends as many steps later.
+    out, _ = resumed.communicate(timeout=PATIENCE)
+    assert len(re.findall(r": finished after 4[01],\d{3} steps", out)) == 2, out
 
 
 def alive(pid):
