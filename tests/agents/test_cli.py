@@ -22,6 +22,8 @@ COMMANDS = {
         "reproduce",
         "train",
         "clone",
+        "sweep",
+        "best",
         "publish",
         "evaluate",
         "bound",
