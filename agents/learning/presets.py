@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from agents.learning.ppo import PPOSettings
+from agents.learning.ppo.settings import PPOSettings
 from agents.learning.sac.settings import SACSettings
 from agents.learning.settings import AlgorithmSettings
 

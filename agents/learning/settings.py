@@ -124,6 +124,8 @@ class AlgorithmSettings(ABC):
     def _common(self, env: Any, seed: int, log: Path, critic: str) -> dict[str, Any]:
         import torch
 
+        from agents.learning.flat_adam import FlatAdam
+
         kinds = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU, "elu": torch.nn.ELU, "silu": torch.nn.SiLU}
         widths = self.hidden if self.critic_hidden is None else self.critic_hidden
         return {
@@ -136,7 +138,8 @@ class AlgorithmSettings(ABC):
             "policy_kwargs": {
                 "net_arch": {"pi": list(self.hidden), critic: list(widths)},
                 "activation_fn": kinds[self.activation],
-                "optimizer_kwargs": {"fused": True},
+                "optimizer_class": FlatAdam,
+                "optimizer_kwargs": {},
             },
             "tensorboard_log": str(log),
             "seed": seed,

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from agents.learning.callback import Keeper
-from agents.learning.ppo import PPOSettings
+from agents.learning.ppo.settings import PPOSettings
 from agents.learning.run import Run
 from agents.learning.sac.settings import SACSettings
 from agents.learning.train import train

@@ -61,13 +61,13 @@ class PPOSettings(AlgorithmSettings):
 
     @property
     def model_class(self) -> Any:
-        """Class of Stable-Baselines3's PPO."""
-        from stable_baselines3 import PPO
+        """Class of Stable-Baselines3's PPO with its gradient in closed form."""
+        from agents.learning.ppo.agent import PPO
 
         return PPO
 
     def model(self, env: Any, seed: int, log: Path) -> Any:
-        """Stable-Baselines3's PPO on the CPU. Arguments of `AlgorithmSettings.model`."""
+        """PPO on the CPU. Arguments of `AlgorithmSettings.model`."""
         arguments = self._common(env, seed, log, "vf")
         arguments["policy_kwargs"]["log_std_init"] = self.log_std_init
         arguments["policy_kwargs"]["optimizer_kwargs"]["eps"] = self.adam_epsilon

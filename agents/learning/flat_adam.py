@@ -1,0 +1,80 @@
+"""Adam over parameters that lie in one tensor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import torch
+from torch import Tensor
+
+LINE = 16
+"""Number of parameters in a line of the cache."""
+
+
+class FlatAdam:
+    """Adam whose parameters become parts of one tensor, and their gradients parts of another.
+
+    A step is some operations on all parameters at once: one by one, those of small networks cost it five times as
+    much. It takes the place of one of torch's, whose import of a compiler takes longer than 100 000 control periods.
+
+    Args:
+        params: parameters on the CPU. They keep their places from here on, and so do their gradients, which are zero
+            where nothing was written.
+        lr: learning rate [-].
+        betas: decay of the means of the gradients and of their squares [-].
+        eps: gradients well below it move their parameters little [-].
+    """
+
+    def __init__(
+        self, params: Iterable[Tensor], lr: float, betas: tuple[float, float] = (0.9, 0.999), eps: float = 1e-8
+    ) -> None:
+        parts = list(params)
+        self.param_groups = [{"lr": lr}]
+        """The learning rate, as torch's optimizers have it."""
+        self._betas, self._eps = betas, eps
+        # Each starts where a vector register's load does not cross a line of the cache.
+        sizes = [-(-part.numel() // LINE) * LINE for part in parts]
+        self.values = torch.zeros(sum(sizes))
+        """All parameters, one after the other."""
+        self.gradient = torch.zeros_like(self.values)
+        """Their gradients."""
+        self._mean, self._square, self._steps = torch.zeros_like(self.values), torch.zeros_like(self.values), 0
+        for part, values, slopes in zip(parts, self.values.split(sizes), self.gradient.split(sizes), strict=True):
+            place = values[: part.numel()].view_as(part)
+            part.data, part.grad = place.copy_(part.data), slopes[: part.numel()].view_as(part)
+
+    def zero_grad(self, set_to_none: bool = True) -> None:
+        """Makes all gradients zero, where they are, whatever `set_to_none` says."""
+        del set_to_none
+        self.gradient.zero_()
+
+    def clip(self, longest: float) -> None:
+        """Scales the gradient down to a norm of `longest`, as torch's `clip_grad_norm_` does."""
+        norm = self.gradient.norm().item()
+        if norm > longest:
+            self.gradient.mul_(longest / (norm + 1e-6))
+
+    def step(self) -> None:
+        """Moves the parameters."""
+        self._steps += 1
+        short, long = self._betas
+        self._mean.lerp_(self.gradient, 1.0 - short)
+        self._square.mul_(long).addcmul_(self.gradient, self.gradient, value=1.0 - long)
+        # The means begin at zero.
+        scale = (1.0 - long**self._steps) ** 0.5
+        rate = self.param_groups[0]["lr"] * scale / (1.0 - short**self._steps)
+        self.values.addcdiv_(self._mean, self._square.sqrt().add_(self._eps * scale), value=-rate)
+
+    def state_dict(self) -> dict[str, Any]:
+        """What a step depends on, but for parameters, gradients and settings."""
+        return {"mean": self._mean, "square": self._square, "steps": self._steps}
+
+    def load_state_dict(self, state: Mapping[str, Any], strict: bool = True) -> None:
+        """Takes over what `state_dict` gave. ValueError for other sizes, whatever `strict` says."""
+        del strict
+        if state["mean"].shape != self._mean.shape:
+            raise ValueError(f"state must be of {len(self._mean)} parameters, got {len(state['mean'])}")
+        self._mean.copy_(state["mean"])
+        self._square.copy_(state["square"])
+        self._steps = state["steps"]

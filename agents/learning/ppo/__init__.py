@@ -1,0 +1,1 @@
+"""Proximal policy optimisation with its gradient in closed form."""
