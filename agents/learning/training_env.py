@@ -13,6 +13,10 @@ from elbow_gym.vector_env import ElbowArmVectorEnv
 METERS = {"reward_tracking": "-", "reward_energy": "-", "tracking_error": "m", "electrical_power": "W"}
 """Units of those entries of the step's info whose means over all arms and control periods are kept."""
 
+GROUPS = 16
+"""Largest number of clocks among staggered arms: arms that end together start anew together, which costs as much as
+one arm's reset does."""
+
 
 class MeteredVectorEnv(ElbowArmVectorEnv):
     """`ElbowArmVectorEnv` with autoreset "SameStep" that sums up `METERS`.
@@ -26,8 +30,9 @@ class MeteredVectorEnv(ElbowArmVectorEnv):
         super().__init__(num_envs, **arguments, autoreset_mode="SameStep")
         self._sums = dict.fromkeys(METERS, 0.0)
         self.staggered = False
-        """Whether a reset of all arms spreads the clocks of their first episodes evenly. Episodes are equally long:
-        otherwise all arms of a rollout show the same part of the task, and an update forgets the others."""
+        """Whether a reset of all arms spreads the clocks of their first episodes evenly, in `GROUPS`. Episodes are
+        equally long: otherwise all arms of a rollout show the same part of the task, and an update forgets the
+        others."""
         self.metered_periods = 0
         """Number of control periods since the last reading, summed over all arms."""
 
@@ -38,7 +43,9 @@ class MeteredVectorEnv(ElbowArmVectorEnv):
         observation, info = super().reset(seed=seed, options=options)
         if self.staggered and "reset_mask" not in (options or {}):
             state = self.get_state()
-            state["episodes"]["steps"] = np.arange(self.num_envs) * self.settings.horizon // self.num_envs
+            groups = min(self.num_envs, GROUPS)
+            group = np.arange(self.num_envs) * groups // self.num_envs
+            state["episodes"]["steps"] = group * self.settings.horizon // groups
             self.set_state(state)
             observation = self.episodes.observe().observation
         return observation, info

@@ -490,6 +490,11 @@ def test_staggered_arms_end_their_first_episodes_one_after_the_other():
         _, _, _, truncated, _ = env.step(np.zeros((5, 10), np.float32))
         ends += [(k, int(i)) for i in np.flatnonzero(truncated)]
     assert ends == [(5, 4), (10, 3), (15, 2), (20, 1), (25, 0)]
+    many = MeteredVectorEnv(32, duration=0.5)
+    many.staggered = True
+    many.reset(seed=0)
+    steps = many.get_state()["episodes"]["steps"]
+    assert steps.tolist() == [25 * (i // 2) // 16 for i in range(32)]
     # Who resets some arms wants whole episodes, and the others left alone.
     env.step(np.zeros((5, 10), np.float32))
     before = env.get_state()["episodes"]["steps"]
