@@ -153,6 +153,7 @@ def bounds(
     tasks: Positional[Path],
     output: Positional[Path],
     under_table: bool | None = None,
+    starts: Count = 2,
     machines: OmitArgPrefixes[Machines] = MACHINES,
 ) -> None:
     """Finds the bounds of many tasks side by side and writes a CSV; run it again to go on after an interruption.
@@ -161,11 +162,12 @@ def bounds(
         tasks: JSON file: a list of objects with the arguments of one environment each.
         output: CSV file: a row for each task.
         under_table: As in `bound`.
+        starts: As in `bound`.
         machines: Machines.
     """
     from agents.optimal.command import solve_file
 
-    solve_file(tasks, output, None if under_table is None else not under_table, machines)
+    solve_file(tasks, output, None if under_table is None else not under_table, machines, starts)
 
 
 @app.command

@@ -21,6 +21,7 @@ def bounds(
     tasks: Sequence[Settings],
     *,
     above_table: bool | None = None,
+    starts: int = 2,
     workers: int | None = None,
     machines: Machines | None = None,
     progress: Callable[[int], Any] = lambda _: None,
@@ -34,6 +35,7 @@ def bounds(
     Args:
         tasks: arguments of `bound`.
         above_table: as in `bound`.
+        starts: as in `bound`.
         workers: processes, one task each; as many as there are cores when None.
         machines: what solves them in place of `workers`.
         progress: called with a task's number when it is done.
@@ -47,7 +49,7 @@ def bounds(
     store.folder.mkdir(parents=True, exist_ok=True)
     with (machines or Machines(workers=workers)).pool(len(tasks)) as pool:
         for k, one in enumerate(tasks):
-            pool.submit(k, Job(partial(_bound_apart, one, above_table, store), 1, f"task {k}", store.folder))
+            pool.submit(k, Job(partial(_bound_apart, one, above_table, starts, store), 1, f"task {k}", store.folder))
         for k, answer in pool.outcomes(lambda _: None):
             if isinstance(answer, Exception) and not isinstance(answer, ChildProcessError):
                 raise answer
@@ -56,10 +58,10 @@ def bounds(
     return [found[k] for k in range(len(tasks))]
 
 
-def _bound_apart(settings: Settings, above_table: bool | None, store: Store, tell: Tell) -> Bound | str:
+def _bound_apart(settings: Settings, above_table: bool | None, starts: int, store: Store, tell: Tell) -> Bound | str:
     """`bound` in a process of its own; a failure as its reason, which is no error of the others."""
     del tell
     try:
-        return bound(settings, above_table=above_table, store=store)
+        return bound(settings, above_table=above_table, starts=starts, store=store)
     except (SolveError, ValueError) as error:
         return str(error)

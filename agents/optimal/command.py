@@ -68,7 +68,7 @@ def solve_and_print(
         print(output)
 
 
-def solve_file(tasks: Path, output: Path, above_table: bool | None, machines: Machines) -> None:
+def solve_file(tasks: Path, output: Path, above_table: bool | None, machines: Machines, starts: int = 2) -> None:
     """Finds the bounds of the tasks of a file with a bar on stderr, and writes a row for each.
 
     Args:
@@ -76,6 +76,7 @@ def solve_file(tasks: Path, output: Path, above_table: bool | None, machines: Ma
         output: CSV of the tasks' numbers, what became of them, and the figures.
         above_table: as in `bound`.
         machines: what solves them; their storage, where they have one, holds the store.
+        starts: as in `bound`.
 
     Raises:
         ValueError: the file holds something else, or an environment refuses a task, which is named by its number.
@@ -87,7 +88,12 @@ def solve_file(tasks: Path, output: Path, above_table: bool | None, machines: Ma
     store = None if machines.storage is None else Store(machines.place(Path("bounds")))
     with tqdm(total=len(settings), unit="task", file=sys.stderr) as bar:
         found = bounds(
-            settings, above_table=above_table, machines=machines, progress=lambda _: bar.update(), store=store
+            settings,
+            above_table=above_table,
+            starts=starts,
+            machines=machines,
+            progress=lambda _: bar.update(),
+            store=store,
         )
     solved = [one for one in found if isinstance(one, Bound)]
     names = list(solved[0].figures) if solved else []

@@ -54,13 +54,14 @@ def test_tasks_of_a_file_become_rows_and_those_that_fail_are_named(tmp_path, mon
 
     def here(settings, **options):
         given.extend(settings)
+        assert options["starts"] == 3
         options["progress"](0)
         return ["no guess converged"] * len(settings)
 
     monkeypatch.setattr(command, "bounds", here)
     tasks, output = tmp_path / "tasks.json", tmp_path / "bounds.csv"
     tasks.write_text('[{"elbows": 1, "payload": 0.2}, {"elbows": 0}]')
-    solve_file(tasks, output, None, Machines())
+    solve_file(tasks, output, None, Machines(), starts=3)
     assert [(one.elbow_joints, one.payload, one.start_noise) for one in given] == [((4,), 0.2, 0.0), ((), 0.0, 0.0)]
     assert output.read_text().splitlines() == ["task,status", "0,no guess converged", "1,no guess converged"]
     assert "task 1 failed: no guess converged\n0 of 2 tasks solved" in capsys.readouterr().out
