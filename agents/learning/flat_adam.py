@@ -19,8 +19,8 @@ class FlatAdam:
     much. It takes the place of one of torch's, whose import of a compiler takes longer than 100 000 control periods.
 
     Args:
-        params: parameters on the CPU. They keep their places from here on, and so do their gradients, which are zero
-            where nothing was written.
+        params: parameters on the CPU. They keep their places from here on, and so do their gradients from each
+            `zero_grad` on.
         lr: learning rate [-].
         betas: decay of the means of the gradients and of their squares [-].
         eps: gradients well below it move their parameters little [-].
@@ -40,14 +40,18 @@ class FlatAdam:
         self.gradient = torch.zeros_like(self.values)
         """Their gradients."""
         self._mean, self._square, self._steps = torch.zeros_like(self.values), torch.zeros_like(self.values), 0
+        self._slopes: list[tuple[Tensor, Tensor]] = []
         for part, values, slopes in zip(parts, self.values.split(sizes), self.gradient.split(sizes), strict=True):
-            place = values[: part.numel()].view_as(part)
-            part.data, part.grad = place.copy_(part.data), slopes[: part.numel()].view_as(part)
+            part.data = values[: part.numel()].view_as(part).copy_(part.data)
+            self._slopes.append((part, slopes[: part.numel()].view_as(part)))
+        self.zero_grad()
 
     def zero_grad(self, set_to_none: bool = True) -> None:
-        """Makes all gradients zero, where they are, whatever `set_to_none` says."""
+        """Makes all gradients zero, in their places even if `set_to_none`, which another optimizer may have done."""
         del set_to_none
         self.gradient.zero_()
+        for part, slope in self._slopes:
+            part.grad = slope
 
     def clip(self, longest: float) -> None:
         """Scales the gradient down to a norm of `longest`, as torch's `clip_grad_norm_` does."""

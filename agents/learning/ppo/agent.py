@@ -52,7 +52,7 @@ class PPO(stable_baselines3.PPO):
         ended: list[tuple[int, int]] = []
         last: list[Any] = []
         with torch.no_grad():
-            actor, log_std = Layers(actor_layers(self)), self.policy.log_std
+            (actor, critic), log_std = self._networks(), self.policy.log_std
             departure = torch.randn(buffer.actions.shape)
             noise = log_std.exp() * departure
             buffer.log_probs[:] = log_prob(departure, log_std)
@@ -75,13 +75,13 @@ class PPO(stable_baselines3.PPO):
                         last.append(infos[i]["terminal_observation"])
             buffer.pos, buffer.full = n_rollout_steps, True
             seen = torch.from_numpy(buffer.observations).flatten(0, 1)
-            values = [self.policy.predict_values(part) for part in seen.split(self.batch_size)]
+            values = [critic.forward(part) for part in seen.split(self.batch_size)]
             buffer.values[:] = torch.cat(values).view(buffer.values.shape)
             if ended:
                 # The episode would have gone on.
-                after = self.policy.predict_values(torch.from_numpy(np.array(last)))
+                after = critic.forward(torch.from_numpy(np.array(last)))
                 buffer.rewards[tuple(np.transpose(ended))] += self.gamma * after.numpy().ravel()
-            following = self.policy.predict_values(torch.from_numpy(self._last_obs))
+            following = critic.forward(torch.from_numpy(self._last_obs))
         buffer.compute_returns_and_advantage(last_values=following, dones=dones)
         callback.update_locals(locals())
         callback.on_rollout_end()
@@ -96,9 +96,9 @@ class PPO(stable_baselines3.PPO):
         policy.set_training_mode(True)
         self._update_learning_rate(policy.optimizer)
         clip_range = self.clip_range(self._current_progress_remaining)
-        actor = Layers(actor_layers(self))
-        critic = Layers([*policy.mlp_extractor.value_net, policy.value_net])
+        actor, critic = self._networks()
         optimizer, log_std = policy.optimizer, policy.log_std
+        optimizer.zero_grad()
         figures: list[tuple[float, ...]] = []
         diverged = False
         with torch.no_grad():
@@ -122,6 +122,11 @@ class PPO(stable_baselines3.PPO):
                 if diverged:
                     break
         self._log(figures, clip_range)
+
+    def _networks(self) -> tuple[Layers, Layers]:
+        """Actor, whose outputs are the means of the actions, and critic."""
+        critic = [*self.policy.mlp_extractor.value_net, self.policy.value_net]
+        return Layers(actor_layers(self)), Layers(critic)
 
     def _batches(self) -> Iterator[Batch]:
         """The samples of the rollout buffer in batches, in random order."""

@@ -43,6 +43,15 @@ def test_short_gradients_are_not_scaled():
     assert optimizer.gradient.norm().item() == pytest.approx(0.25, rel=1e-5)
 
 
+def test_gradients_come_back_to_their_places_after_another_optimizer():
+    parts = parameters()
+    optimizer = FlatAdam(parts, lr=0.1)
+    torch.optim.Adam(parts).zero_grad(set_to_none=True)
+    optimizer.zero_grad()
+    sum(part.sum() for part in parts).backward()
+    assert optimizer.gradient.sum() == sum(part.numel() for part in parts)
+
+
 def test_state_goes_on_bit_for_bit_and_fits_its_own_size_alone():
     def step(optimizer, count):
         for k in range(count):
