@@ -66,16 +66,31 @@ def energy(words: Sequence[str]) -> Callable[..., None]:
 
 
 @app.command
-def learning(output: Path = RESULTS, curves: Path = CURVES) -> None:
+def learning(
+    output: Path = RESULTS,
+    curves: Path = CURVES,
+    against: Path | None = None,
+    python: Path | None = None,
+    seeds: Count = 5,
+) -> None:
     """Learning curves against control periods and seconds, and when the PD was beaten: figure, CSV and table.
+
+    Shows this build beside another one, too: PPO's time until the PD is beaten, and where it goes.
 
     Args:
         output: Folder of the results, with energy.csv.
         curves: Folder of the learning curves.
+        against: Checkout of another build, with which this one trains in turn, for about a quarter of an hour of CPU
+            time; what was measured before is shown when None.
+        python: Interpreter with that build's libraries; this one when None.
+        seeds: Number of training seeds of each build and elbow count.
     """
+    from benchmarks import builds
     from benchmarks.learning import save
 
-    for row in save(output, curves):
+    if against is not None:
+        builds.measure(against, python, seeds, output)
+    for row in (*save(output, curves), *builds.save(output)):
         print("  ".join(row))
 
 

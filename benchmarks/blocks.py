@@ -14,6 +14,7 @@ BLOCKS = {
         "energy": "energy_brief.md",
         "breakdown": "breakdown.md",
         "learning": "learning.md",
+        "builds": "builds.md",
         "speed": "speed_brief.md",
         "precision": "precision.md",
     },
