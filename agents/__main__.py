@@ -12,6 +12,7 @@ from agents.cli import Commands, Count, JsonObject, Seed
 from agents.jobs.machines import Machines
 from agents.task_options import Elbows, TaskOptions
 
+On = OmitArgPrefixes[Machines]
 TASK, MACHINES = TaskOptions(), Machines()
 app = Commands("python -m agents", "Controllers of the arm: training, evaluation, pictures, the paper's results.")
 
@@ -125,6 +126,7 @@ def bound(
     fresh: bool = False,
     starts: Count = 2,
     output: Path | None = None,
+    machines: On = MACHINES,
 ) -> None:
     """Finds the best known solution of any task without contact, with its certificate; solved tasks are kept.
 
@@ -140,12 +142,13 @@ def bound(
         fresh: Whether it is solved again, and from postures; the better solution is kept.
         starts: Number of postures that a task from scratch is started from; more than two are all followed to the end.
         output: File for the trajectory, .npz.
+        machines: Machines, which follow a start each.
     """
     from agents.optimal.command import settings_of, solve_and_print
 
     more = {"circle": circle, "payload": payload, "start": start, **environment}
     above_table = None if under_table is None else not under_table
-    solve_and_print(settings_of(elbows, weights, pose, more), above_table, fresh, output, starts)
+    solve_and_print(settings_of(elbows, weights, pose, more), above_table, fresh, output, starts, machines)
 
 
 @app.command
@@ -154,7 +157,7 @@ def bounds(
     output: Positional[Path],
     under_table: bool | None = None,
     starts: Count = 2,
-    machines: OmitArgPrefixes[Machines] = MACHINES,
+    machines: On = MACHINES,
 ) -> None:
     """Finds the bounds of many tasks side by side and writes a CSV; run it again to go on after an interruption.
 

@@ -40,7 +40,12 @@ def settings_of(
 
 
 def solve_and_print(
-    settings: Settings, above_table: bool | None, fresh: bool, output: Path | None, starts: int = 2
+    settings: Settings,
+    above_table: bool | None,
+    fresh: bool,
+    output: Path | None,
+    starts: int = 2,
+    machines: Machines | None = None,
 ) -> None:
     """Finds a bound with a bar on stderr and prints it.
 
@@ -50,6 +55,7 @@ def solve_and_print(
         fresh: as in `bound`.
         output: file for its trajectory, .npz; none when None.
         starts: as in `bound`.
+        machines: as in `bound`, and its storage, where it has one, holds the store.
     """
     from tqdm import tqdm
 
@@ -59,7 +65,9 @@ def solve_and_print(
             bar.set_description(line[:60])
             bar.update()
 
-        found = bound(settings, above_table=above_table, fresh=fresh, starts=starts, parallel=True, progress=advance)
+        store = _store(machines)
+        options = {"fresh": fresh, "starts": starts, "machines": machines, "progress": advance, "store": store}
+        found = bound(settings, above_table=above_table, **options)
         bar.total = bar.n
     for line in lines(found):
         print(line)
@@ -85,7 +93,7 @@ def solve_file(tasks: Path, output: Path, above_table: bool | None, machines: Ma
 
     check_writable(output.parent)
     settings = _settings_in(tasks)
-    store = None if machines.storage is None else Store(machines.place(Path("bounds")))
+    store = _store(machines)
     with tqdm(total=len(settings), unit="task", file=sys.stderr) as bar:
         found = bounds(
             settings,
@@ -106,6 +114,11 @@ def solve_file(tasks: Path, output: Path, above_table: bool | None, machines: Ma
         if not isinstance(one, Bound):
             print(f"task {k} failed: {one}")
     print(f"{len(solved)} of {len(found)} tasks solved: {output}")
+
+
+def _store(machines: Machines | None) -> Store | None:
+    """The store on the machines' storage; None for the checkout's own."""
+    return None if machines is None or machines.storage is None else Store(machines.place(Path("bounds")))
 
 
 def _settings_in(tasks: Path) -> list[Settings]:

@@ -16,7 +16,7 @@ from typing import TypeVar
 
 from agents.control.trajectory import Trajectory
 from agents.jobs.job import Job, Tell
-from agents.jobs.machines import do_all
+from agents.jobs.machines import Machines, do_all
 from agents.optimal.certificate import Bound, checked
 from agents.optimal.descent import STAGES, Descended, Descent
 from agents.optimal.guesses import posture_guesses, simulated
@@ -48,7 +48,7 @@ is the shorter way."""
 
 
 def descended(
-    problem: Problem, guesses: Mapping[str, Trajectory], progress: Progress, parallel: bool = False
+    problem: Problem, guesses: Mapping[str, Trajectory], progress: Progress, machines: Machines | None = None
 ) -> tuple[dict[str, Descended], float]:
     """Ends of the first stage of the descents from all guesses by name, the cheapest first.
 
@@ -58,7 +58,7 @@ def descended(
     Raises:
         SolveError: the simulator can follow no guess.
     """
-    found, elsewhere = _of_each(problem, guesses, _descend, progress, parallel)
+    found, elsewhere = _of_each(problem, guesses, _descend, progress, machines)
     if not found:
         raise SolveError(f"the simulator must follow a guess, got none of {sorted(guesses)} that it can")
     return dict(sorted(found.items(), key=lambda item: item[1].cost)), elsewhere
@@ -82,13 +82,13 @@ def _of_each(
     guesses: Mapping[str, Trajectory],
     way: Callable[[Problem, Trajectory, Progress], Found],
     progress: Progress,
-    parallel: bool,
+    machines: Machines | None,
 ) -> tuple[dict[str, Found], float]:
     """Where a way leads from each guess, without those that fail, and the CPU time that other processes took [s]."""
     elsewhere = 0.0
-    if parallel and len(guesses) > 1:
+    if machines is not None and len(guesses) > 1:
         jobs = {name: Job(partial(_apart, way, problem, guess), 1) for name, guess in guesses.items()}
-        results = do_all(jobs, lambda _: None)
+        results = do_all(jobs, lambda _: None, machines)
         elsewhere = sum(seconds for *_, seconds in results.values())
         answers = {name: answer for name, (answer, _, _) in results.items()}
         for name, (_, said, _) in results.items():
@@ -153,7 +153,7 @@ def certified(
     guesses: Mapping[str, Trajectory],
     progress: Progress = lambda _: None,
     refine: bool = True,
-    parallel: bool = False,
+    machines: Machines | None = None,
     thorough: bool = False,
 ) -> tuple[Bound, Solution]:
     """Solves a problem from several guesses, refines the best, plays it in the simulator and checks it.
@@ -163,7 +163,7 @@ def certified(
         guesses: motions to start from, by name.
         progress: called with a line on every solve.
         refine: whether the mesh is refined; if not, the simulator's verdict alone is the check.
-        parallel: whether every guess is followed in a process of its own.
+        machines: what follows every guess by itself; this process follows one after the other when None.
         thorough: whether every guess is followed to a solution, of which the cheapest is taken. Otherwise that goes for
             the guess alone with the cheapest descent, which need not lead to the cheapest solution.
 
@@ -176,12 +176,12 @@ def certified(
     took = _stopwatch()
     program = Transcription(problem, COARSE)
     if thorough:
-        solutions, elsewhere = _of_each(problem, guesses, _follow, progress, parallel)
+        solutions, elsewhere = _of_each(problem, guesses, _follow, progress, machines)
         if not solutions:
             raise SolveError(f"a guess must lead to a solution, got none of {sorted(guesses)} that does")
         name, best = min(solutions.items(), key=lambda item: item[1].cost)
         return _finished(program, best, name, progress, refine, partial(took, elsewhere)), best
-    ends, elsewhere = descended(problem, guesses, progress, parallel)
+    ends, elsewhere = descended(problem, guesses, progress, machines)
     failures: list[str] = []
     for name, end in islice(ends.items(), FOLLOWED):
         followed = _tried(_follow, problem, end.trajectory, partial(_say, progress, name))
@@ -234,7 +234,7 @@ def bound(
     above_table: bool | None = None,
     fresh: bool = False,
     starts: int = 2,
-    parallel: bool = False,
+    machines: Machines | None = None,
     progress: Progress = lambda _: None,
     store: Store | None = None,
 ) -> Bound:
@@ -250,8 +250,8 @@ def bound(
         fresh: whether it is solved again, and from the postures; the cheaper solution stays in the store.
         starts: number of postures that a task from scratch is started from. Of two the cheaper descent is followed to a
             solution, of more all are, and the cheapest solution is taken.
-        parallel: whether the postures are followed in processes of their own; a script then needs its
-            `if __name__ == "__main__":`.
+        machines: what follows the postures side by side, such as `Machines()`, with which a script needs its
+            `if __name__ == "__main__":`; this process follows one after the other when None.
         progress: called with a line on every solve.
         store: folder of the solved tasks; the checkout's own when None.
 
@@ -280,7 +280,7 @@ def bound(
                 progress(f"{NEIGHBOUR}: {error}")
     if found is None:
         guesses = {**posture_guesses(problem, starts), **guesses}
-        found = certified(problem, guesses, progress, parallel=parallel, thorough=starts >= THOROUGH)
+        found = certified(problem, guesses, progress, machines=machines, thorough=starts >= THOROUGH)
     answer, coarse = found
     if known is not None and known.cost <= answer.cost:
         return known

@@ -35,7 +35,7 @@ def test_command_prints_the_certificate_and_writes_the_trajectory(tmp_path, monk
     found = []
 
     def here(settings, **options):
-        found.append(optimal.bound(settings, **{**options, "parallel": False, "store": Store(tmp_path)}))
+        found.append(optimal.bound(settings, **{**options, "machines": None, "store": Store(tmp_path)}))
         return found[0]
 
     monkeypatch.setattr(command, "bound", here)
