@@ -62,6 +62,14 @@ def clone(words: Sequence[str]) -> Callable[..., None]:
 
 
 @app.command_from
+def newton(words: Sequence[str]) -> Callable[..., None]:
+    """Trains one policy for drawn tasks on Newton's steps from its own motions."""
+    from agents.learning.command import newton_command
+
+    return newton_command(words)
+
+
+@app.command_from
 def sweep(words: Sequence[str]) -> Callable[..., None]:
     """Compares algorithms, elbows, settings and arguments of the environment over seeds: a table and a figure."""
     from agents.sweep.command import sweep_command

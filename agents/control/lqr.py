@@ -71,13 +71,14 @@ class Linearisation:
 
     Args:
         settings: the environment.
-        periods: control periods of the trajectories.
+        periods: control periods of the trajectories, all arms together.
         central: whether differences go to both sides, in twice the time.
+        arms: number of arms whose periods take turns.
     """
 
-    def __init__(self, settings: Settings, periods: int, central: bool = True) -> None:
+    def __init__(self, settings: Settings, periods: int, central: bool = True, arms: int = 1) -> None:
         arm, self._steps, n = settings.parsed_arm, settings.substeps, settings.parsed_arm.n_joints
-        self._n, self._periods, self._together = n, periods, min(periods, TOGETHER)
+        self._n, self._periods, self._together = n, periods, min(periods, max(1, TOGETHER // arms) * arms)
         self._apart = (2.0 if central else 1.0) * STEP
         self._nudge = np.concatenate([np.eye(4 * n), -np.eye(4 * n) if central else np.zeros((1, 4 * n))]) * STEP
         self._simulator = Simulator(
@@ -89,7 +90,7 @@ class Linearisation:
             integrator=settings.integrator,
         )
 
-    def __call__(self, states: Array, voltage: Array) -> tuple[Array, Array]:
+    def __call__(self, states: Array, voltage: Array, parameters: Array | None = None) -> tuple[Array, Array]:
         """Slopes of x_(k+1) in x_k, (N, 3n, 3n), and in v_k, (N, 3n, n).
 
         Deviations of the pose and the rates are projected onto the elbows' plane before they are applied.
@@ -97,8 +98,14 @@ class Linearisation:
         Args:
             states: (q, q_dot, current) at the starts of the periods, (N, 3n).
             voltage: terminal voltages [V], (N, n).
+            parameters: parameter rows of the arms whose periods take turns, (arms, PARAMETER_ROWS, n), as
+                `Simulator.parameters` has them; those of the settings when None.
         """
         n, size = self._n, 4 * self._n
+        if parameters is not None:
+            rows = np.repeat(parameters, len(self._nudge), axis=0)
+            turns = self._simulator.num_envs // len(rows)
+            self._simulator.set_parameters(np.arange(self._simulator.num_envs), np.tile(rows, (turns, 1, 1)))
         slopes = np.empty((self._periods, 3 * n, size))
         # The last batch overlaps the one before where the periods do not divide evenly.
         for first in (*range(0, self._periods - self._together, self._together), self._periods - self._together):
@@ -116,10 +123,22 @@ class Linearisation:
             jacobian = constraint_jacobian(simulator.arm, poses, simulator.elbows)
             turned = np.swapaxes(jacobian, -1, -2)
             rates = rates - (turned @ np.linalg.solve(jacobian @ turned, jacobian @ rates[..., None]))[..., 0]
-        simulator.reset(poses, rates, current)
+        place(simulator, np.concatenate([poses, rates, current], axis=-1))
         simulator.advance(np.ascontiguousarray(volts), self._steps)
-        after = np.concatenate([simulator.q, simulator.q_dot, simulator.current], axis=-1)
-        return after.reshape(len(states), len(self._nudge), 3 * n)
+        return states_of(simulator).reshape(len(states), len(self._nudge), 3 * n)
+
+
+def place(simulator: Simulator, states: Array) -> None:
+    """Puts arms into states (q, q_dot, current), (B, 3n), without the checks and the summary of `Simulator.reset`."""
+    rows = np.zeros_like(simulator.raw[0])
+    rows[:, :3] = states.reshape(simulator.num_envs, 3, -1)
+    zero = {"summary": np.zeros(1), "clock": np.zeros(1, dtype=np.int64), "motion": np.zeros(1)}
+    simulator.put(np.arange(simulator.num_envs), {"state": rows, **zero})
+
+
+def states_of(simulator: Simulator) -> Array:
+    """States (q, q_dot, current) of the arms, (B, 3n)."""
+    return np.concatenate([simulator.q, simulator.q_dot, simulator.current], axis=-1)
 
 
 def lqr_gains(settings: Settings, trajectory: Trajectory) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import time
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
@@ -17,14 +16,13 @@ from numpy.typing import NDArray
 
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import Trajectory
-from agents.files import check_writable
-from agents.jobs.job import Job, Tell
-from agents.jobs.machines import Machines, do_all
+from agents.jobs.job import Tell
+from agents.jobs.machines import Machines
 from agents.learning.clone_settings import CloneSettings
+from agents.learning.rounds import Judge, RoundsRun, train_by_rounds
 from agents.learning.run import machine, versions
 from agents.learning.run_folder import RunFolder
 from agents.learning.threads import one_thread
-from agents.workers import compile_before
 from elbow_gym.baselines.policy import Policy
 from elbow_gym.baselines.policy_card import PolicyCard
 from elbow_gym.task.settings import Settings
@@ -143,35 +141,14 @@ def clone_all(
         ValueError: there is no such trajectory, or a folder holds a run already and `resume` is not set or it had
             other settings.
     """
-    from tqdm import tqdm
-
     if not trajectory.is_file():
         raise ValueError(f"trajectory must be a file that `python -m benchmarks optimal` wrote, got no {trajectory}")
-    results: dict[int, dict[str, Any]] = {}
-    jobs: dict[int, Job[dict[str, Any]]] = {}
-    for seed, folder in zip(seeds, folders, strict=True):
-        files = RunFolder(folder)
-        files.check(_record(settings, trajectory, how, seed), resume)
-        finished = files.result()
-        if finished is not None:
-            results[seed] = finished
-        else:
-            work = partial(_clone_one, settings, trajectory.absolute(), how, seed, folder, command)
-            jobs[seed] = Job(work, how.rounds, folder.name, folder)
-    if jobs:
-        for seed, folder in zip(seeds, folders, strict=True):
-            if seed in jobs:
-                check_writable(folder)
-        compile_before([settings])
-        try:
-            with tqdm(total=len(jobs) * how.rounds, unit="round", desc="clone") as bar:
-                results.update(do_all(jobs, bar.update, machines))
-        except KeyboardInterrupt:
-            for folder in folders:
-                finished = RunFolder(folder).result() is not None
-                print(f"{folder.name}: {'finished' if finished else 'stopped; --resume starts it anew'}", flush=True)
-            raise
-    return {seed: results[seed] for seed in seeds}
+    work = partial(_clone_one, settings, trajectory.absolute(), how, command)
+    runs = {
+        seed: RoundsRun(folder=folder, record=_record(settings, trajectory, how, seed), work=work, rounds=how.rounds)
+        for seed, folder in zip(seeds, folders, strict=True)
+    }
+    return train_by_rounds(runs, settings, "clone", "stopped; --resume starts it anew", resume, machines)
 
 
 def _record(settings: Settings, trajectory: Path, how: CloneSettings, seed: int) -> dict[str, Any]:
@@ -186,44 +163,19 @@ def _record(settings: Settings, trajectory: Path, how: CloneSettings, seed: int)
 
 
 def _clone_one(
-    settings: Settings, trajectory: Path, how: CloneSettings, seed: int, folder: Path, command: str, tell: Tell
+    settings: Settings, trajectory: Path, how: CloneSettings, command: str, run: RoundsRun, tell: Tell
 ) -> dict[str, Any]:
     """Clones with one seed, in a process of its own."""
-    from agents.learning.evaluation import evaluation, evaluation_row, evaluation_seeds
-
-    files = RunFolder(folder)
-    files.open(_record(settings, trajectory, how, seed), resume=True)
-    rows: list[list[float]] = []
-    best: list[Policy] = []
-    spent, since = 0.0, time.monotonic()
-    started = since
+    files, seed = RunFolder(run.folder), run.record["seed"]
+    files.open(run.record, resume=True)
+    judge = Judge(files, settings)
     training = {**asdict(how), "seed": seed, "machine": machine()}
     card = {"command": command, "training": training, "versions": versions()}
 
     def after_round(steps: int, policy: Policy) -> None:
-        nonlocal spent, since
-        spent += time.monotonic() - since
-        figures = evaluation(policy, settings)
-        rows.append(evaluation_row(steps, spent, time.monotonic() - started, figures))
-        files.write_evaluations(rows)
-        if not best or figures["return"] > best[0].card.evaluation["return"]:
-            policy.card.training.update(timesteps=steps, seconds=round(spent, 1))
-            policy.card.evaluation.update(figures, seeds=list(evaluation_seeds(settings)))
-            files.write_best(policy)
-            best[:] = [policy]
+        judge(steps, policy)
         tell(1)
-        since = time.monotonic()
 
     with one_thread():
         clone(settings, Trajectory.load(trajectory), how, seed, card, after_round)
-    result = {
-        "name": folder.name,
-        "seed": seed,
-        "steps": int(rows[-1][0]),
-        "finished": True,
-        "training_seconds": round(spent, 1),
-        "wall_seconds": round(time.monotonic() - started, 1),
-        "best": best[0].card.evaluation,
-    }
-    files.write_result(result)
-    return result
+    return judge.finish(seed)

@@ -1,4 +1,4 @@
-"""Commands that train: `python -m agents train` and `python -m agents clone`."""
+"""Commands that train: `python -m agents train`, `python -m agents clone` and `python -m agents newton`."""
 
 from __future__ import annotations
 
@@ -16,13 +16,15 @@ from tyro.conf import OmitArgPrefixes, Positional, arg, subcommand
 from agents.cli import Count, Seed, spelled
 from agents.jobs.machines import Machines
 from agents.learning.clone_settings import CloneSettings
+from agents.learning.newton.settings import NewtonSettings
 from agents.learning.presets import ALGORITHMS, default_settings
 from agents.learning.settings import AlgorithmSettings
 from agents.task_options import TaskOptions
-from agents.tasks import RUNS
+from agents.tasks import RUNS, plain_arguments
 
 if TYPE_CHECKING:
     from agents.learning.run import Run
+    from elbow_gym.baselines.policy import Policy
 
 REQUIRED = "(required)"
 
@@ -69,6 +71,29 @@ class Teacher:
     """Number of elbows on the table."""
     trajectory: Path | None = None
     """File of the trajectory, as `python -m benchmarks optimal` writes it; the shipped one for the elbows when None."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lead(Seeds):
+    """Number and folders of the runs, and what drives at first."""
+
+    initial_policy: Path | None = None
+    """Policy that drives in the first rounds; the shipped PPO of drawn arms, or of the number of elbows, when None."""
+
+    def first(self, task: TaskOptions) -> Policy:
+        """The initial policy of a task. Raises ValueError where none is given and none shipped."""
+        from elbow_gym.baselines.policy import load_policy
+
+        if self.initial_policy is not None:
+            return load_policy(self.initial_policy)
+        if task.elbows in (None, 2):
+            return load_policy("ppo", env="ElbowArmRandom-v0")
+        if not isinstance(task.elbows, int):
+            raise ValueError(f"--initial-policy must be given for the elbows {task.elbows}, got None")
+        return load_policy("ppo", elbows=task.elbows)
+
+
+DRAWN, LEAD, MACHINES, NEWTON = TaskOptions(env="ElbowArmTasks-v0"), Lead(), Machines(), NewtonSettings()
 
 
 def train_command(words: Sequence[str]) -> Callable[..., None]:
@@ -125,6 +150,33 @@ def clone_command(words: Sequence[str]) -> Callable[..., None]:
             print(f"{result['name']}: {result['training_seconds']:.0f} s, return {result['best']['return']:.2f}")
 
     return clone
+
+
+def newton_command(words: Sequence[str]) -> Callable[..., None]:
+    """The command `newton`."""
+
+    def newton(
+        task: OmitArgPrefixes[TaskOptions] = DRAWN,
+        run: OmitArgPrefixes[Lead] = LEAD,
+        machines: OmitArgPrefixes[Machines] = MACHINES,
+        imitation: OmitArgPrefixes[NewtonSettings] = NEWTON,
+    ) -> None:
+        """Trains one policy for drawn tasks on Newton's steps from its own motions, several seeds side by side.
+
+        Each seed has a folder OUTPUT/newton_TASK_seedK with its best policy, evaluations.csv and a checkpoint.
+        """
+        from agents.learning.newton.runs import newton_all
+        from elbow_gym.task.settings import Settings
+
+        output = machines.place(run.output)
+        folders = {seed: output / f"newton_{task.name}_seed{seed}" for seed in run.all}
+        settings = Settings(**plain_arguments(task.settings()))
+        command = spelled("agents", "newton", words)
+        results = newton_all(settings, task.env, run.first(task), imitation, folders, command, run.resume, machines)
+        for result in results.values():
+            print(f"{result['name']}: {result['training_seconds']:.0f} s, return {result['best']['return']:.2f}")
+
+    return newton
 
 
 def publish_command(words: Sequence[str]) -> Callable[..., None]:

@@ -10,7 +10,7 @@ pytest.importorskip("stable_baselines3")
 
 from agents.control.lqr import TimeVaryingLQR
 from agents.control.trajectory import Trajectory
-from agents.learning import clone as cloning
+from agents.learning import rounds
 from agents.learning.clone import clone, clone_all
 from agents.learning.clone_settings import CloneSettings
 from agents.learning.evaluation import evaluation
@@ -56,7 +56,7 @@ def test_same_seed_gives_the_same_clone_bit_for_bit(beginning):
 
 @pytest.fixture
 def here(monkeypatch):
-    monkeypatch.setattr(cloning, "do_all", in_this_process)
+    monkeypatch.setattr(rounds, "do_all", in_this_process)
 
 
 @pytest.mark.usefixtures("here")

@@ -1,0 +1,1 @@
+"""Imitation of Newton's steps from the policy's own motions, on tasks that are drawn anew in every round."""
