@@ -14,7 +14,7 @@ class NewtonSettings:
     Raises ValueError naming the argument, the rule and the value.
     """
 
-    rounds: int = 90
+    rounds: int = 30
     """Number of rounds; each draws new tasks."""
     num_envs: int = 32
     """Number of tasks in a round."""
@@ -23,13 +23,13 @@ class NewtonSettings:
     first_price: float = 12.0
     """Price of an angle's square deviation in the first step [1/rad^2]; steps that succeed make the next ones cheaper.
     It keeps a step where its expansion holds."""
-    smoothing: float = 0.005
+    smoothing: float = 0.02
     """Length that smooths the tracking error in the first round [m]."""
     smoothing_final: float = 0.002
     """The same from `smoothing_until` on [m]."""
     smoothing_until: float = 0.6
     """Share of the rounds during which the smoothing falls [-], in (0, 1]."""
-    led_rounds: int = 3
+    led_rounds: int = 2
     """Number of rounds at the start in which the initial policy drives and the network only watches."""
     policy_noise: float = 0.06
     """Largest standard deviation of the noise on the policy's actions in its second episode of each task, in units of
@@ -38,8 +38,8 @@ class NewtonSettings:
     """Standard deviation of the noise on the teacher's actions in its episode, in units of the supply voltage."""
     most_rounds: int = 40
     """Most rounds whose labels the network is fitted to; the later half of them so far, if that is fewer."""
-    gradient_steps: int = 200
-    """Number of gradient steps after every round, four times as many after a led one."""
+    gradient_steps: int = 160
+    """Number of gradient steps after every round, twice as many after a led one."""
     batch_size: int = 2048
     """Number of samples in each gradient step."""
     learning_rate: float = 1.5e-3
