@@ -14,7 +14,7 @@ from elbow_gym.baselines.tasks import registered_arguments
 if TYPE_CHECKING:
     from elbow_gym.task.settings import Settings
 
-POLICY_NAME = re.compile(r"(?P<controller>[a-z]+(_[a-z]+)??)_(?P<task>elbows\d+|table|random)")
+POLICY_NAME = re.compile(r"(?P<controller>[a-z]+(_[a-z]+)??)_(?P<task>elbows\d+|table|random|tasks(_elbows\d+)?)")
 """Names of the files of policies and curves before "_seedK": ALGORITHM[_LABEL]_TASK."""
 RUNS = Path("runs")
 """Folder in which trainings make theirs, unless another is asked for."""

@@ -1,4 +1,4 @@
-"""Commands of the benchmarks: `python -m benchmarks energy | learning | optimal | planners | speed`."""
+"""Commands of the benchmarks: `python -m benchmarks energy | learning | optimal | planners | speed | tasks`."""
 
 from __future__ import annotations
 
@@ -157,6 +157,46 @@ def speed(words: Sequence[str]) -> Callable[..., None]:
         measure_speed(output, quick, publish, command=spelled("benchmarks", "speed", words))
 
     return speed
+
+
+@app.command
+def tasks(
+    output: Path = LATEST,
+    elbows: tuple[int, ...] = (2, 1, 0),
+    solve: bool = False,
+    planners: bool = False,
+    disturb: bool = False,
+    players: Annotated[UseAppendAction[tuple[str, ...]], arg(name="with", metavar="WHAT")] = (),
+    trust: bool = False,
+    publish: bool = False,
+    machines: OmitArgPrefixes[Machines] = MACHINES,
+) -> None:
+    """How far every player stays from the optimum of each evaluation task of ElbowArmTasks-v0.
+
+    Some minutes of CPU time, with the planners some hours; what was played with the same code is not played again. The
+    optima are those in benchmarks/results/tasks_optima.csv.
+
+    Args:
+        output: Folder for the tables and the figure.
+        elbows: Elbows on the table, of 2, 1 and 0.
+        solve: Whether to find the optima that are not in the file yet, instead of playing; about two minutes of CPU
+            time each. Every one is written as it is found, so that an interrupted run goes on where it stopped.
+        planners: Whether the planners play, too.
+        disturb: Whether everybody also plays with constants off by 10 %, sensor noise, delay, and an untold payload.
+        players: Player of your own, as `python -m agents evaluate --help` says, for a row beside the others; may be
+            given several times, with one LABEL= for the training seeds of one.
+        trust: Whether to read a .zip, whose pickles can run any code when they are read.
+        publish: Whether to write the results to benchmarks/results and the table into the README.
+        machines: Machines.
+    """
+    if solve:
+        from benchmarks.tasks.optima import solve as solve_tasks
+
+        print(solve_tasks(elbows, machines))
+        return
+    from benchmarks.tasks.run import tasks as play_tasks
+
+    print(play_tasks(output, elbows, players, planners, disturb, trust, publish, machines))
 
 
 if __name__ == "__main__":

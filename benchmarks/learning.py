@@ -18,11 +18,14 @@ from agents.style import CONTROLLER_COLOURS, CONTROLLER_NAMES, ELBOW_NAMES, pypl
 from agents.tasks import POLICY_NAME
 from benchmarks.machine import RESULTS
 from benchmarks.optimal import Cell, cached
+from elbow_gym.baselines.tasks import task_name
+from elbow_gym.suite import ENV as TASKS_ENV
 
 Array = NDArray[np.float64]
 
 POINTS = 200
 TASKS = {**{f"elbows{elbows}": ELBOW_NAMES[elbows] for elbows in (2, 1, 0)}, "table": "table", "random": "drawn arms"}
+TASKS |= {task_name(TASKS_ENV, elbows): f"drawn tasks, {ELBOW_NAMES[elbows]}" for elbows in (2, 1, 0)}
 AXES = {"steps": "control periods", "training_seconds": "seconds of training, one core a seed"}
 """Labels of the horizontal axes by column of the curves."""
 

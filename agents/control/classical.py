@@ -6,7 +6,9 @@ since the start by their own calls: make one controller per episode, and let all
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -15,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.minimum_jerk import minimum_jerk
-from agents.control.posture import best_postures, leads_to
+from agents.control.posture import CIRCLE_POINTS, best_postures, leads_to
 from elbow_gym.baselines.pd import PAPER_KD, PAPER_KP
 from elbow_gym.checks import positive
 from elbow_gym.interface import Environment, Interface
@@ -91,9 +93,15 @@ class Reference:
 class _Following(ABC):
     """Base of the controllers, which observe the state, follow a reference and give clipped actions."""
 
-    def __init__(self, env: Environment, pose: ArrayLike | None = None, reach_time: float = REACH_TIME) -> None:
+    def __init__(
+        self,
+        env: Environment,
+        pose: ArrayLike | None = None,
+        reach_time: float = REACH_TIME,
+        payload: float = 0.0,
+    ) -> None:
         self._interface = Interface(env)
-        self._inverse = InverseDynamics(self._interface.arm, self._interface.elbows)
+        self._inverse = InverseDynamics(self._interface.arm, self._interface.elbows, payload)
         self._reference = Reference(env, pose, reach_time)
 
     def predict(
@@ -145,6 +153,7 @@ class ComputedTorque(_Following):
         env: the environment that it will act in; `COMPUTED` has its arguments.
         pose: angles that joints 2..n-2 end in [rad], (n,); the start pose when None.
         reach_time: time from the start to the target [s].
+        payload: mass at the hand that it is told of [kg].
     """
 
     def _voltage(self, wanted: Motion, q: Array, q_dot: Array, current: Array) -> Array:
@@ -154,18 +163,34 @@ class ComputedTorque(_Following):
 
 
 @cache
-def economical_pose(arm: ArmParameters, elbows: tuple[int, ...], circle: Circle) -> Array:
+def economical_pose(arm: ArmParameters, elbows: tuple[int, ...], circle: Circle, payload: float = 0.0) -> Array:
     """The pose [rad], (n,), whose idle joints hold the arm over the circle with least copper loss, none below z = 0.
 
     Only poses count that the arm can move to with its elbows on the table; the start pose where none is found.
     """
     start = on_table(arm, arm.nominal_pose, elbows)
     try:
-        postures = best_postures(arm, elbows, circle)
+        postures = best_postures(arm, elbows, circle, payload=payload)
     # No posture serves the whole circle with all joints above the table.
     except ValueError:
         return start
     return next((posture.pose for posture in postures if leads_to(arm, elbows, posture.pose)), start)
+
+
+@cache
+def task_pose(arm: ArmParameters, elbows: tuple[int, ...], circle: Circle, payload: float = 0.0) -> Array:
+    """A pose [rad], (n,), from which the last two links and the yaw follow a circle without ranges.
+
+    The start pose where that is one; otherwise the `economical_pose`, which is for points around the circle.
+    """
+    start = on_table(arm, arm.nominal_pose, elbows)
+    try:
+        HandPlacement(arm, start).joints(circle.position(np.linspace(0.0, 2.0 * np.pi, 73)))
+    # The last two links do not cover the circle from there.
+    except ValueError:
+        around = replace(circle, radius=circle.radius / math.cos(math.pi / CIRCLE_POINTS))
+        return economical_pose(arm, elbows, around, payload)
+    return start
 
 
 def economical_computed_torque(env: Environment) -> ComputedTorque:

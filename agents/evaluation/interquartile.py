@@ -1,7 +1,8 @@
-"""Many runs as one figure: the interquartile mean and its bootstrap interval."""
+"""Many runs as one figure: the interquartile mean or a quantile, and its bootstrap interval."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -15,7 +16,7 @@ TRIMMED = 0.25
 
 
 class Estimate(NamedTuple):
-    """An interquartile mean with its 95 % bootstrap interval."""
+    """A statistic with its 95 % bootstrap interval."""
 
     value: float
     low: float
@@ -31,18 +32,40 @@ def center(samples: ArrayLike) -> float:
 
 
 def interquartile_mean(samples: ArrayLike) -> Estimate:
-    """Mean of the middle half of the samples, with a percentile bootstrap interval.
+    """Mean of the middle half of the samples, with the interval of `bootstrapped`."""
+    return bootstrapped(samples, lambda drawn: _middle(drawn).mean(axis=-1))
+
+
+def quantile(samples: ArrayLike, share: float) -> Estimate:
+    """Smallest sample that a share of all samples does not exceed, with the interval of `bootstrapped`."""
+    return bootstrapped(samples, lambda drawn: np.quantile(drawn, share, axis=-1, method="inverted_cdf"))
+
+
+def bootstrapped(samples: ArrayLike, statistic: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Estimate:
+    """A statistic with a percentile bootstrap interval.
 
     Samples of several training seeds, (seeds, episodes), count together; a resampling draws seeds first and then
     episodes within each, since episodes of one policy are not independent. The resampling is seeded, so the same
     samples give the same estimate. NaN samples give NaN.
+
+    Args:
+        samples: (episodes,) or (seeds, episodes).
+        statistic: maps samples along the last axis, (..., N), to (...).
+
+    Raises:
+        ValueError: there are no samples.
     """
     rows = np.atleast_2d(np.asarray(samples, dtype=np.float64))
-    flat, value = rows.ravel(), center(rows)
-    if flat.size == 1 or np.ptp(flat) == 0.0 or np.isnan(flat).any():
+    flat = rows.ravel()
+    if flat.size == 0:
+        raise ValueError("samples must hold at least one value, got none")
+    if np.isnan(flat).any():
+        return Estimate(*[float("nan")] * 3)
+    value = float(statistic(flat))
+    if flat.size == 1 or np.ptp(flat) == 0.0:
         return Estimate(value, value, value)
-    means = _middle(flat[_draws(*rows.shape)]).mean(axis=-1)
-    low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    found = statistic(flat[_draws(*rows.shape)])
+    low, high = np.quantile(found, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
     return Estimate(value, float(low), float(high))
 
 

@@ -23,6 +23,7 @@ from agents.tasks import POLICY_NAME, Elbows, task_settings
 from elbow_gym.baselines.pd import CLIPPED, UNLIMITED, PDController
 from elbow_gym.baselines.policy import baseline_path, read_policy
 from elbow_gym.baselines.tasks import registered_arguments, task_name
+from elbow_gym.suite import ENV as TASKS_ENV
 from elbow_gym.task.settings import STARTS
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -104,6 +105,7 @@ class Entry(NamedTuple):
 def entries() -> list[Entry]:
     """All entries but `PLANNERS`: classical ones, and those that a file is there for; the compliant table's at the end.
 
+    Policies of `TASKS_ENV` are left out: each of their episodes is another task.
     Where a policy for the compliant table is shipped, the classical controllers with a supply of 24 V play there too.
     """
     found = [Entry(name, elbows) for name in CLASSICAL for elbows in ELBOW_COUNTS]
@@ -112,7 +114,7 @@ def entries() -> list[Entry]:
         for elbows in ELBOW_COUNTS
         if all(optimal_trajectory(elbows, start).is_file() for start in STARTS)
     ]
-    policies = sorted(learned(), key=lambda entry: (entry.name, -entry.elbows))
+    policies = sorted((one for one in learned() if one.env != TASKS_ENV), key=lambda entry: (entry.name, -entry.elbows))
     found += [entry for entry in policies if entry.env != TABLE_ENV]
     tabletop = [entry for entry in policies if entry.env == TABLE_ENV]
     if tabletop:
@@ -123,7 +125,8 @@ def entries() -> list[Entry]:
 def learned() -> dict[Entry, str]:
     """Shipped policies, without the seed in their names, by the entry that they play.
 
-    A policy trained on drawn arms and circles plays the paper's, under a name that ends in "_random".
+    A policy trained on drawn arms and circles plays the paper's, under a name that ends in "_random". The name of one
+    that plays in `TASKS_ENV` ends in "_tasks".
     """
     found: dict[Entry, str] = {}
     for group in sorted({policy.rpartition("_seed")[0] for policy in shipped_policies()}):
@@ -135,6 +138,10 @@ def learned() -> dict[Entry, str]:
             found[Entry(name, 0, TABLE_ENV)] = group
         elif task == "random":
             found[Entry(f"{name}_random", 2)] = group
+        elif task.startswith("tasks"):
+            found[Entry(f"{name}_tasks", int(task.removeprefix("tasks_elbows")) if "_" in task else 2, TASKS_ENV)] = (
+                group
+            )
         else:
             found[Entry(name, int(task.removeprefix("elbows")))] = group
     return found
@@ -176,7 +183,7 @@ def find_player(
 def known_names(elbows: Elbows | None = None, env: str = "ElbowArm-v0") -> list[str]:
     """Names of the registry in an environment with elbows, the classical controllers' first and the planners' last."""
     count = registered_arguments(env).get("elbows", 2) if elbows is None else elbows
-    beside = {one.name for one in entries() if one[1:] == (count, env)}
+    beside = {one.name for one in (*entries(), *learned()) if one[1:] == (count, env)}
     return [*CLASSICAL, *sorted(beside - set(CLASSICAL)), *PLANNERS]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -58,6 +58,7 @@ def record(
     seeds: Sequence[int],
     progress: Callable[[int, int], None] | None = None,
     every: int = 1,
+    options: Mapping[str, Any] | None = None,
 ) -> Recording:
     """Runs one episode per seed, side by side, through the engine of the batched environment.
 
@@ -67,12 +68,13 @@ def record(
         seeds: one per episode.
         progress: called with the periods done and in all, a hundred times a run.
         every: number of control periods between two recorded instants, a divisor of their number.
+        options: options of the reset, the same for all arms.
 
     Raises:
-        ValueError: `every` does not divide the number of control periods.
+        ValueError: `every` does not divide the number of control periods, or the environment refuses the options.
         ArithmeticError: the simulation left what float64 can represent.
     """
-    return record_starts(settings, (settings.start,), make_controller, seeds, progress, every)[settings.start]
+    return record_starts(settings, (settings.start,), make_controller, seeds, progress, every, options)[settings.start]
 
 
 def record_starts(
@@ -82,6 +84,7 @@ def record_starts(
     seeds: Sequence[int],
     progress: Callable[[int, int], None] | None = None,
     every: int = 1,
+    options: Mapping[str, Any] | None = None,
 ) -> dict[str, Recording]:
     """Runs one episode per seed from each of several starts, all side by side under one controller.
 
@@ -95,18 +98,19 @@ def record_starts(
         seeds: one per episode, the same for every start.
         progress: called with the periods done and in all, a hundred times a run.
         every: number of control periods between two recorded instants, a divisor of their number.
+        options: options of the reset, the same for all arms.
 
     Returns:
         The recordings by start.
 
     Raises:
-        ValueError: `every` does not divide the number of control periods.
+        ValueError: `every` does not divide the number of control periods, or the environment refuses the options.
         ArithmeticError: the simulation left what float64 can represent.
     """
     horizon = settings.horizon
     if every < 1 or horizon % every:
         raise ValueError(f"every must divide the number of control periods ({horizon}), got {every}")
-    env, observation = _started(settings, starts, seeds)
+    env, observation = _started(settings, starts, seeds, options)
     controller = make_controller(env)
     episodes = env.episodes
     series: dict[str, Any] = {}
@@ -158,14 +162,14 @@ def instant(simulator: Simulator) -> dict[str, Array]:
 
 
 def _started(
-    settings: Settings, starts: Sequence[str], seeds: Sequence[int]
+    settings: Settings, starts: Sequence[str], seeds: Sequence[int], options: Mapping[str, Any] | None
 ) -> tuple[ElbowArmVectorEnv, NDArray[np.float32]]:
     """An environment whose arms have been reset from each start in turn with all seeds, and its observation."""
 
     def reset(start: str) -> tuple[ElbowArmVectorEnv, NDArray[np.float32]]:
         arguments = replace(settings, start=start).arguments
         env = ElbowArmVectorEnv(len(seeds), **arguments, autoreset_mode="Disabled")
-        return env, env.reset(seed=list(seeds))[0]
+        return env, env.reset(seed=list(seeds), options=None if options is None else dict(options))[0]
 
     apart = [reset(start) for start in starts]
     if len(apart) == 1:

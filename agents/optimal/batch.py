@@ -24,7 +24,7 @@ def bounds(
     starts: int = 2,
     workers: int | None = None,
     machines: Machines | None = None,
-    progress: Callable[[int], Any] = lambda _: None,
+    progress: Callable[[int, Bound | str], Any] = lambda *_: None,
     store: Store | None = None,
 ) -> list[Bound | str]:
     """The bound of every task, or why there is none, in the tasks' order.
@@ -38,7 +38,7 @@ def bounds(
         starts: as in `bound`.
         workers: processes, one task each; as many as there are cores when None.
         machines: what solves them in place of `workers`.
-        progress: called with a task's number when it is done.
+        progress: called with a task's number and what is found of it when it is done.
         store: folder of the solved tasks; the checkout's own when None.
     """
     store = Store() if store is None else store
@@ -54,7 +54,7 @@ def bounds(
             if isinstance(answer, Exception) and not isinstance(answer, ChildProcessError):
                 raise answer
             found[k] = str(answer) if isinstance(answer, ChildProcessError) else answer
-            progress(k)
+            progress(k, found[k])
     return [found[k] for k in range(len(tasks))]
 
 

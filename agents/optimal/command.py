@@ -100,7 +100,7 @@ def solve_file(tasks: Path, output: Path, above_table: bool | None, machines: Ma
             above_table=above_table,
             starts=starts,
             machines=machines,
-            progress=lambda _: bar.update(),
+            progress=lambda *_: bar.update(),
             store=store,
         )
     solved = [one for one in found if isinstance(one, Bound)]

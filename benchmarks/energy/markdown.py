@@ -95,7 +95,7 @@ def with_interval(estimate: Estimate) -> str:
 
 def markdown(rows: Sequence[Row]) -> str:
     """Every row, with 95 % intervals."""
-    return _pipes([HEADER, *(shown(row) for row in rows)])
+    return pipes([HEADER, *(shown(row) for row in rows)])
 
 
 def brief(rows: Sequence[Row]) -> str:
@@ -116,7 +116,7 @@ def brief(rows: Sequence[Row]) -> str:
                 str(len(whole.seeds)) if whole.seeds else "-",
             )
         )
-    return _pipes(lines)
+    return pipes(lines)
 
 
 def short(rows: Sequence[Row]) -> str:
@@ -132,10 +132,11 @@ def short(rows: Sequence[Row]) -> str:
         gaps = ["" if regimes["A"].gap is None else percent(regimes["A"].gap) for regimes in of]
         error = significant(of[0]["B"].figures["error_rms"].value)
         lines.append((look(controller)[0], *energies, *gaps, error))
-    return _pipes(lines)
+    return pipes(lines)
 
 
-def _pipes(lines: Sequence[tuple[str, ...]]) -> str:
+def pipes(lines: Sequence[tuple[str, ...]]) -> str:
+    """Lines of cells as a Markdown table, the first its header."""
     rule = ("---",) * len(lines[0])
     return "".join(f"| {' | '.join(line)} |\n" for line in (lines[0], rule, *lines[1:]))
 

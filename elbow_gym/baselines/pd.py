@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from elbow_gym.checks import positive
 from elbow_gym.interface import Environment, Interface
@@ -25,7 +25,7 @@ CLIPPED: dict[str, Any] = {"control_frequency": 2000.0, "voltage_limit": 24.0, "
 class PDController:
     """v = kp (q_d - q) + kd (q_d_dot - q_dot) on every joint (eq. 27), in volts, then in the action's unit.
 
-    q_d keeps the start pose but for joints 1, n-1 and n, which put the hand on the target (eq. 29), joints 1 and n-1 by
+    q_d keeps one pose but for joints 1, n-1 and n, which put the hand on the target (eq. 29), joints 1 and n-1 by
     the turn nearest to where they are; q_d_dot is its exact derivative. On the paper's arm the control is stable at
     2 kHz, as with the environment's arguments `CLIPPED`, not at 1 kHz.
 
@@ -33,16 +33,19 @@ class PDController:
         env: the environment that it will act in, single or batched, wrapped or not.
         kp: proportional gain [V/rad].
         kd: derivative gain [V s/rad].
+        pose: angles that joints 2..n-2 keep [rad], (n,); the start pose when None.
 
     Raises:
         ValueError: env is another environment, a gain is not positive, or the circle is out of reach of joints 1, n-1
             and n; that message has the distance missing.
     """
 
-    def __init__(self, env: Environment, kp: float = PAPER_KP, kd: float = PAPER_KD) -> None:
+    def __init__(
+        self, env: Environment, kp: float = PAPER_KP, kd: float = PAPER_KD, pose: ArrayLike | None = None
+    ) -> None:
         self.kp, self.kd = positive("kp", kp), positive("kd", kd)
         self._interface = interface = Interface(env)
-        self._placement = HandPlacement(interface.arm, interface.pose)
+        self._placement = HandPlacement(interface.arm, interface.pose if pose is None else pose)
         # A drawn circle is another one in each episode.
         if not interface.circle.random:
             self.desired(np.linspace(0.0, 2.0 * np.pi, 73))

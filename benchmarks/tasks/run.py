@@ -1,0 +1,110 @@
+"""Comparison of all players on the evaluation tasks, against each task's optimum."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from agents.files import write_csv, write_text, write_whole
+from agents.jobs.job import Job
+from agents.jobs.machines import Machines, do_all
+from agents.workers import compile_before
+from benchmarks.blocks import publish_blocks
+from benchmarks.machine import CACHE, RESULTS
+from benchmarks.tasks.contenders import Contender, contenders
+from benchmarks.tasks.episodes import DISTURBANCES, NOMINAL, UNITS, played
+from benchmarks.tasks.optima import OPTIMA, numbered_tasks, optimal_figures
+from benchmarks.tasks.report import disturbed_table, figure, table, write_scores
+from benchmarks.tasks.scores import Episodes, Key, scores
+
+
+def tasks(
+    output: Path,
+    elbows: Sequence[int],
+    guests: Sequence[str] = (),
+    planners: bool = False,
+    disturb: bool = False,
+    trust: bool = False,
+    publish: bool = False,
+    machines: Machines | None = None,
+    optima: Path = OPTIMA,
+    folder: Path = CACHE,
+) -> str:
+    """Plays everybody on the evaluation tasks that are solved; writes tables, CSV and a figure. Returns the tables.
+
+    Args:
+        output: folder of the results, unless they are published.
+        elbows: elbow counts.
+        guests: players of the user's own, WHAT or LABEL=WHAT.
+        planners: whether the planners play.
+        disturb: whether everybody also plays under the `DISTURBANCES`.
+        trust: whether files that may run code when they are read may be read.
+        publish: whether the results go to benchmarks/results, and the tables into the README.
+        machines: what plays.
+        optima: file of the optima.
+        folder: folder of what was played before.
+
+    Raises:
+        ValueError: no task is solved, or a player of the user's own plays at none of the elbow counts.
+    """
+    known = {key: of for key, of in optimal_figures(optima).items() if key[0] in elbows}
+    if not known:
+        raise ValueError(f"{optima} must hold an optimum for the elbows {list(elbows)}, got none; --solve finds them")
+    lineup = contenders([count for count in elbows if any(key[0] == count for key in known)], guests, planners, trust)
+    names = list(DISTURBANCES) if disturb else [NOMINAL]
+    episodes = _episodes(lineup, names, list(known), machines, folder)
+    found = scores(episodes, known)
+    output = RESULTS if publish else output
+    write_scores(found, output / "tasks.csv")
+    _write_episodes(episodes, output / "tasks_episodes.csv")
+    texts = {"tasks.md": table(found, known), "tasks_disturbed.md": disturbed_table(found)}
+    for name, text in texts.items():
+        write_text(output / name, text)
+    write_whole(output / "tasks.png", partial(figure, found))
+    if publish:
+        publish_blocks(output)
+    return "\n".join(text for text in texts.values() if text)
+
+
+def _episodes(
+    lineup: Sequence[Contender], names: Sequence[str], keys: Sequence[Key], machines: Machines | None, folder: Path
+) -> Episodes:
+    """Figures of everybody's episodes in some tasks under some disturbances."""
+    from tqdm import tqdm
+
+    settings = [one.player().settings for one in lineup]
+    compile_before((one, 1) for one in settings)
+    jobs = {}
+    for one in lineup:
+        tasks = {number: numbered_tasks(one.elbows)[number] for elbows, number in keys if elbows == one.elbows}
+        for name in names:
+            jobs[one, name] = Job(partial(played, one, tasks, name, folder), len(tasks), f"{one.name}, {name}")
+    with tqdm(total=sum(job.size for job in jobs.values()), unit="episode", file=sys.stderr) as bar:
+        return do_all(jobs, bar.update, machines)
+
+
+def _write_episodes(episodes: Episodes, path: Path) -> None:
+    """Writes a row for each episode."""
+    header = [
+        "elbows",
+        "controller",
+        "seed",
+        "disturbance",
+        "task",
+        *(f"{name} [{unit}]" for name, unit in UNITS.items()),
+    ]
+    rows = [
+        [
+            one.elbows,
+            one.name,
+            "" if one.seed is None else one.seed,
+            name,
+            number,
+            *(f"{figures[k]:.6g}" for k in UNITS),
+        ]
+        for (one, name), of in episodes.items()
+        for number, figures in of.items()
+    ]
+    write_csv(path, header, rows)
