@@ -1,4 +1,8 @@
-"""Commands of the agents: `python -m agents COMMAND`."""
+"""Commands of the agents: `python -m agents COMMAND`.
+
+The list is one idea and stays one file at over 300 lines: a function for each command, whose arguments and docstring are
+the command's options and help; what it does lies in the room that it calls.
+"""
 
 from __future__ import annotations
 
