@@ -3,10 +3,10 @@
 Pinned: sb3-contrib 2.9.2, stable-baselines3 2.9.2, gymnasium 1.4.0, torch 2.13.0.
 `python -m agents.recipes.sb3_contrib_tqc`, or with `--algorithm crossq`
 
-As `sb3_ppo`: through `SB3VecEnv`, so "SameStep". An exploring volt is worth less than stock critics err. Here it moves an
-action further, since a third of the supply is all that the arm gets in training; rewards are ten times the
-environment's, so that TQC's loss is linear past a tenth of it; critics and actor see this project's `Foresight`; and the
-policy is the average of the last actors.
+As `sb3_ppo`: through `SB3VecEnv`, so "SameStep". An exploring volt is worth less than stock critics err. Here a volt is
+more of an action, since a third of the supply is all that the arm gets in training; rewards are ten times the
+environment's, so that TQC's loss is linear past a tenth of it; critics and actor see this project's `Foresight`; and
+the policy is the average of the last actors.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ class View(BaseFeaturesExtractor):
         self._view = view
 
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
+        """Inputs of the networks [-], shape (B, view.size), from observations [-], shape (B, size)."""
         return self._view(observation)
 
 
