@@ -71,6 +71,8 @@ def race(build: str, checkout: Path, python: Path, elbows: int, seed: int, goal:
 def measure(checkout: Path, python: Path | None, seeds: int, output: Path = RESULTS) -> None:
     """Trains in both builds in turn, at every elbow count and at `FULL_ARMS`, and writes builds.csv.
 
+    A training that fails is named and has no row.
+
     Args:
         checkout: folder of the other build's checkout.
         python: interpreter with the other build's libraries; this one when None.
@@ -80,13 +82,21 @@ def measure(checkout: Path, python: Path | None, seeds: int, output: Path = RESU
     own = Path(sys.executable)
     builds = {"before": (checkout.resolve(), python or own), "now": (SCRIPT.parents[1], own)}
     known, rows = goals(output), []
+
+    def add(build: str, elbows: int, seed: int, goal: Goal, **settings: Any) -> None:
+        try:
+            rows.append(race(build, *builds[build], elbows, seed, goal, **settings))
+        except ChildProcessError as error:
+            # An old build may fail where this one does not; the others are worth having.
+            print(f"{build}, {ELBOW_NAMES[elbows]}, seed {seed}: {error}", file=sys.stderr)
+        write_csv(output / "builds.csv", HEADER, rows)
+
     for seed in range(seeds):
         for elbows in ELBOW_NAMES:
-            for name, build in builds.items():
-                rows.append(race(name, *build, elbows, seed, known[f"elbows{elbows}"]))
-        for name, build in builds.items():
-            rows.append(race(name, *build, 2, seed, NEVER, num_envs=FULL_ARMS, total_timesteps=FULL_STEPS))
-    write_csv(output / "builds.csv", HEADER, rows)
+            for build in builds:
+                add(build, elbows, seed, known[f"elbows{elbows}"])
+        for build in builds:
+            add(build, 2, seed, NEVER, num_envs=FULL_ARMS, total_timesteps=FULL_STEPS)
 
 
 def table(rows: Sequence[dict[str, str]]) -> list[tuple[str, ...]]:

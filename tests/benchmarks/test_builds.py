@@ -42,6 +42,26 @@ def test_training_runs_in_the_builds_own_checkout_on_one_core(script, tmp_path):
         builds.race("now", tmp_path, Path(sys.executable), 1, 3, Goal(800.0, 12.5))
 
 
+def test_builds_train_in_turn_and_one_that_fails_has_no_row(monkeypatch, tmp_path, capsys):
+    def race(build, checkout, python, elbows, seed, goal, **settings):
+        if (build, elbows, seed) == ("before", 1, 1):
+            raise ChildProcessError("no such arm")
+        return [build, elbows, seed, settings.get("num_envs", 128), *[1.0] * 9]
+
+    monkeypatch.setattr(builds, "race", race)
+    monkeypatch.setattr(builds, "goals", lambda _: dict.fromkeys(("elbows2", "elbows1", "elbows0"), Goal(800.0, 12.0)))
+    builds.measure(tmp_path, None, 2, tmp_path)
+    with (tmp_path / "builds.csv").open(newline="") as handle:
+        names = [(row["build"], row["elbows"], row["arms [-]"]) for row in csv.DictReader(handle)]
+    turn = [
+        (build, *task)
+        for task in (("2", "128"), ("1", "128"), ("0", "128"), ("2", "256"))
+        for build in ("before", "now")
+    ]
+    assert names == [*turn, *(one for one in turn if one != ("before", "1", "128"))]
+    assert "before, one elbow, seed 1: no such arm" in capsys.readouterr().err
+
+
 def test_table_has_medians_of_each_build(tmp_path):
     rows = []
     for build, factor in (("before", 2.0), ("now", 1.0)):
