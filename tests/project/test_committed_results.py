@@ -157,7 +157,9 @@ def test_every_shipped_policy_loads_fits_and_is_small():
         policy = read_policy(path)
         policy.check(ElbowArmEnv(**policy.card.environment))
         assert sum(part.stat().st_size for part in pair(path)) < 300_000
-        assert policy.card.command.startswith(("python -m agents train", "python -m agents clone"))
+        assert policy.card.command.startswith(
+            tuple(f"python -m agents {made}" for made in ("train", "clone", "newton"))
+        )
 
 
 def test_baseline_is_the_best_seed_and_no_policy_is_stored_twice():

@@ -1,4 +1,4 @@
-"""Command lines of train and clone: parsed once, with the defaults of the task that they name."""
+"""Command lines of train, clone and newton: parsed once, with the defaults of the task that they name."""
 
 import json
 import re
@@ -9,6 +9,7 @@ import pytest
 
 from agents.__main__ import app
 from agents.learning.clone_settings import CloneSettings
+from agents.learning.newton.settings import NewtonSettings
 from agents.learning.presets import default_settings
 from agents.shipped.seeds import shipped_path, shipped_policies
 from elbow_gym.baselines.policy import read_policy
@@ -91,7 +92,7 @@ def test_seeds_have_a_run_each_with_the_environment_asked_for(runs):
     assert shlex.split(three[0].command)[-3] == '{"energy_weight": 0.002}'
 
 
-@pytest.mark.parametrize("name", [name for name in shipped_policies() if not name.startswith("clone")])
+@pytest.mark.parametrize("name", [name for name in shipped_policies() if not name.startswith(("clone", "newton"))])
 def test_commands_in_policy_cards_train_the_task_and_the_settings_of_the_card(runs, name):
     card = card_of(name)
     words = card.command.removeprefix("python -m agents ")
@@ -116,6 +117,43 @@ def test_commands_in_clones_cards_clone_with_the_settings_of_the_card(monkeypatc
         recorded = {field.name: card.training[field.name] for field in fields(CloneSettings)}
         assert json.loads(json.dumps(asdict(how))) == recorded
         assert (command, resume, machines.ray) == (card.command, False, None)
+
+
+@pytest.fixture
+def improved(monkeypatch):
+    """The arguments of the trainings on Newton's steps that command lines ask for."""
+    trained = []
+    monkeypatch.setattr("agents.learning.newton.runs.newton_all", lambda *given: trained.append(given) or {})
+    return trained
+
+
+def test_commands_in_cards_of_newtons_steps_train_the_task_and_the_settings_of_the_card(improved):
+    for name in [name for name in shipped_policies() if name.startswith("newton")]:
+        card = card_of(name)
+        app.run(shlex.split(card.command.removeprefix("python -m agents ")))
+        settings, env, _, how, folders, command, *_ = improved.pop()
+        assert folders[card.training["seed"]].name == name
+        assert (env, command) == (card.env, card.command)
+        assert json.loads(json.dumps(settings.arguments)) == card.environment
+        recorded = {field.name: card.training[field.name] for field in fields(NewtonSettings)}
+        assert json.loads(json.dumps(asdict(how))) == recorded
+
+
+@pytest.mark.parametrize(
+    ("line", "folder", "leads"),
+    [
+        ("newton", "newton_tasks_seed0", "ElbowArmRandom-v0"),
+        ("newton --elbows 1 --rounds 3", "newton_tasks_elbows1_seed0", "ElbowArm-v0"),
+        ("newton --elbows 0 --env ElbowArmRandom-v0", "newton_random_elbows0_seed0", "ElbowArm-v0"),
+    ],
+)
+def test_newton_is_led_by_the_shipped_policy_that_comes_nearest(improved, line, folder, leads):
+    app.run(line.split())
+    [(settings, _, initial, how, folders, *_)] = improved
+    assert folders[0].name == folder
+    assert initial.card.env == leads
+    assert leads == "ElbowArmRandom-v0" or initial.card.environment["elbows"] == settings.elbows
+    assert how.rounds == (3 if "--rounds" in line else NewtonSettings().rounds)
 
 
 @pytest.mark.parametrize(
@@ -173,6 +211,7 @@ def test_parser_refuses_a_wrong_value_in_one_line_that_names_it(runs, capsys, li
         ("train ppo --minutes 0", "minutes must be positive, got 0.0"),
         ("train ppo --checkpoint-seconds -1", "checkpoint_seconds must be finite and not negative, got -1.0"),
         ("train ppo --initial-policy nowhere", "--initial-policy must be the path of a policy's files, got nowhere"),
+        ("newton --elbows 4,7", r"--initial-policy must be given for the elbows \(4, 7\), got None"),
         ("evaluate", "WHAT must be at least one of pd_paper, .*ppo.*, or the folder of a run, .*module:callable"),
         ("publish", "runs must be at least one folder of a finished training, got none"),
     ],
