@@ -74,8 +74,9 @@ class Training:
         """Makes a round.
 
         Returns:
-            Means over its tasks: the policy's return, its cost and that of the improved motions, smoothed both; the
-            price of the next round [1/rad^2], and the cost of the fit's errors in an episode.
+            Means over its tasks: the policy's return and the teacher's under noise, the policy's cost and that of the
+            improved motions, smoothed both; the price of the next round [1/rad^2], and the cost of the fit's errors in
+            an episode.
         """
         how, led = self._how, self.rounds < self._how.led_rounds
         smoothing = how.smoothing_at(self.rounds / how.rounds)
@@ -92,7 +93,7 @@ class Training:
             before = found.before if k == 0 else before
         assert found is not None  # newton_steps is at least one
         self._price = float(np.exp(np.log(price).mean()))
-        again, more = self._noisy(seeds, drive, found)
+        again, more, rewards = self._noisy(seeds, drive, found)
         visited = (motions.states, *np.split(more.states, 2))
         observed = np.concatenate([seen, again])
         action = np.concatenate([self._taught(found, slice(None), states[:, :-1]) for states in visited])
@@ -114,6 +115,7 @@ class Training:
         self.rounds += 1
         return {
             "return": float(reward.mean()),
+            "taught_return": float(rewards[how.num_envs :].mean()),
             "cost": float(before.mean()),
             "improved_cost": float(found.after.mean()),
             "price": self._price,
@@ -123,8 +125,8 @@ class Training:
     def _led(self, observed: NDArray[np.float32]) -> tuple[NDArray[np.float32], None]:
         return self._initial.predict(observed[:, : self._watched])
 
-    def _noisy(self, seeds: list[int], drive: Any, found: Improved) -> tuple[NDArray[np.float32], Motions]:
-        """Observations and motions of the same tasks under the policy with noise, and under the teacher with noise."""
+    def _noisy(self, seeds: list[int], drive: Any, found: Improved) -> tuple[NDArray[np.float32], Motions, Array]:
+        """`played` of the same tasks under the policy with noise, and then under the teacher with noise."""
         how, arms, rng = self._how, self._how.num_envs, self._rng
         noise = np.concatenate([how.policy_noise * rng.random(arms), np.full(arms, how.teacher_noise)])
 
@@ -134,8 +136,7 @@ class Training:
             return both + noise[:, None] * rng.standard_normal(both.shape)
 
         first, _ = self._two.reset(seed=seeds + seeds)
-        observed, motions, _ = played(self._two, first, act)
-        return observed, motions
+        return played(self._two, first, act)
 
     def _taught(self, found: Improved, periods: slice, states: Array) -> Array:
         """Teacher's actions, (B, k, n), in states (B, k, 3n) of some periods, around the improved motions."""

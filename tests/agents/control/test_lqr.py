@@ -31,6 +31,19 @@ def test_linearised_period_predicts_the_simulators_next_state(arm, elbows, paylo
     )
 
 
+def test_slopes_of_arms_that_take_turns_are_each_its_own(arm):
+    trajectory, loads = resting(arm), (0.0, 0.3)
+    each = [Settings(duration=0.1, payload=payload) for payload in loads]
+    alone = [Linearisation(one, 5, central=False)(trajectory.states[:-1], trajectory.voltage) for one in each]
+    parameters = np.stack([Simulator(arm, 2, conditions=one.conditions).parameters(np.array([0]))[0] for one in each])
+    states, voltage = (np.repeat(part, 2, axis=0) for part in (trajectory.states[:-1], trajectory.voltage))
+    both = Linearisation(each[0], 10, central=False, arms=2)(states, voltage, parameters)
+    for k in range(2):
+        for own, found in zip(alone[k], both, strict=True):
+            np.testing.assert_allclose(found[k::2], own, atol=1e-9)
+    assert np.abs(alone[0][1] - alone[1][1]).max() > 1e-6
+
+
 def test_lqr_without_a_deviation_gives_the_planned_voltage(arm):
     trajectory = resting(arm)
     trajectory.voltage[:] = 3.0

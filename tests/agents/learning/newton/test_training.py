@@ -36,6 +36,12 @@ def test_fit_comes_nearer_to_the_teacher_in_every_round(initial):
     assert training.steps == SMALL.rounds * 3 * SMALL.num_envs * SETTINGS.horizon
 
 
+def test_teacher_without_noise_does_what_its_labels_say(initial):
+    how = replace(SMALL, rounds=1, teacher_noise=0.0, smoothing=1e-4, smoothing_final=1e-4)
+    figures = Training(SETTINGS, how, 0, initial).round()
+    assert -figures["taught_return"] == pytest.approx(figures["improved_cost"], rel=1e-3)
+
+
 def test_policy_of_a_restored_training_is_the_same(initial):
     training, other = (Training(SETTINGS, SMALL, seed, initial) for seed in (0, 1))
     training.round()
