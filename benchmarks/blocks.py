@@ -15,6 +15,7 @@ BLOCKS = {
         "breakdown": "breakdown.md",
         "learning": "learning.md",
         "builds": "builds.md",
+        "tasks": "tasks.md",
         "speed": "speed_brief.md",
         "precision": "precision.md",
     },

@@ -18,6 +18,7 @@ from agents.evaluation.players import ELBOW_COUNTS, find_player
 from agents.evaluation.receipt import player_again, read_receipt
 from agents.evaluation.regimes import BENCHMARK_SEEDS
 from agents.learning.evaluation import evaluation
+from agents.optimal import certificate
 from agents.optimal.guesses import rollout
 from agents.shipped import RECEIPTS
 from agents.shipped import seeds as shipped
@@ -27,6 +28,7 @@ from benchmarks.energy import breakdown, pareto
 from benchmarks.energy import cells as lineup
 from benchmarks.machine import RESULTS
 from benchmarks.optimal import DEFAULT_WEIGHT, FRONT_WEIGHTS, Cell, cached, cells, files
+from benchmarks.tasks import optima
 from elbow_gym import ElbowArmEnv
 from elbow_gym.baselines import policy as baselines
 from elbow_gym.baselines.policy import pair, read_policy
@@ -146,6 +148,19 @@ def test_receipts_of_the_pd_are_of_the_committed_figures():
         for regime, joules in receipt["joules"].items():
             expected = float(by_key["pd", elbows, regime]["electrical_energy [J]"])
             assert interquartile_mean(joules).value == pytest.approx(expected, rel=1e-5)
+
+
+def test_optima_of_the_evaluation_tasks_are_of_todays_tasks_and_certified():
+    with optima.OPTIMA.open() as handle:
+        rows = list(csv.DictReader(handle))
+    found = optima.read()
+    # A row of another task than today's is not read.
+    assert len(found) == len(rows)
+    for known in optima.optimal_figures().values():
+        assert known["cost"] > 0.001 * known["energy"] / 0.02
+        assert known["stationarity"] <= certificate.STATIONARITY
+        assert known["mesh_change"] <= certificate.REFINEMENT
+        assert known["replay_error"] <= certificate.REPLAY
 
 
 def test_every_shipped_policy_loads_fits_and_is_small():

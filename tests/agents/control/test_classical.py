@@ -7,7 +7,15 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from agents.control import classical
-from agents.control.classical import COMPUTED, ComputedTorque, GravityPD, Reference, SmoothPD, economical_pose
+from agents.control.classical import (
+    COMPUTED,
+    ComputedTorque,
+    GravityPD,
+    Reference,
+    SmoothPD,
+    economical_pose,
+    task_pose,
+)
 from agents.control.minimum_jerk import minimum_jerk
 from agents.control.posture import best_postures, static_copper_loss
 from agents.evaluation.metrics import metrics
@@ -100,7 +108,7 @@ def test_economical_pose_keeps_the_elbows_down_and_costs_less_than_the_papers(ar
 
 
 def test_economical_pose_is_the_start_where_no_posture_serves_the_circle(arm, monkeypatch):
-    def refuse(*_):
+    def refuse(*_, **_more):
         raise ValueError("circle must allow a posture with the elbows (5,) down, got none in 12 searches")
 
     monkeypatch.setattr(classical, "best_postures", refuse)
@@ -137,3 +145,28 @@ def test_single_arm_on_a_drawn_circle_is_played_as_in_a_batch_of_one(make):
     for _ in range(20):
         observation, rows = env.step(controller.predict(observation)[0])[0], batch.step(batched.predict(rows)[0])[0]
         np.testing.assert_array_equal(observation, rows[0])
+
+
+@pytest.mark.slow
+def test_task_pose_is_the_start_pose_where_that_reaches_and_one_that_does_elsewhere(arm):
+    reached = Circle()
+    start = on_table(arm, arm.nominal_pose, (4, 7))
+    np.testing.assert_array_equal(task_pose(arm, (4, 7), reached), start)
+    far = Circle(center=(1.65, 1.65, 0.55), radius=0.15)
+    angle = np.linspace(0.0, 2.0 * np.pi, 73)
+    with pytest.raises(ValueError, match="position must be within reach of the last two links"):
+        inverse_kinematics(arm, start, far.position(angle))
+    pose = task_pose(arm, (4, 7), far, 0.2)
+    q, _ = inverse_kinematics(arm, pose, far.position(angle))
+    np.testing.assert_allclose(hand_position(arm, q), far.position(angle), atol=1e-9)
+    np.testing.assert_allclose(joint_positions(arm, q)[:, [3, 6], 2], 0.0, atol=1e-6)
+
+
+def test_computed_torque_that_is_told_of_its_load_does_not_sag():
+    def error(payload):
+        make = partial(ComputedTorque, payload=payload)
+        settings = Settings(payload=0.2, start="on_target", start_noise=0.0, duration=0.8, **COMPUTED)
+        return metrics(rollout(settings, make)[1], 0.7)["error_rms"][0]
+
+    assert error(0.2) < 1.0  # mm
+    assert error(0.0) > 100.0

@@ -19,6 +19,7 @@ from agents.shipped.seeds import load_policy
 from agents.style import CONTROLLER_COLOURS, CONTROLLER_MARKERS, CONTROLLER_NAMES, SPARE_COLOURS
 from elbow_gym.baselines.pd import PDController
 from elbow_gym.baselines.policy import BASELINES
+from elbow_gym.suite import ENV
 from elbow_gym.table import TableParameters
 from elbow_gym.task.settings import Settings
 from elbow_gym.vector_env import ElbowArmVectorEnv
@@ -90,6 +91,16 @@ def test_policy_refuses_other_elbows_than_those_of_its_training():
     path = next(BASELINES.glob("*_elbows2_*.json"))
     with pytest.raises(ValueError, match=r"^elbows must be 2 as in the policy's training, got 1"):
         find_player(str(path), 1)
+
+
+def test_policies_of_drawn_tasks_play_there_under_a_name_of_their_own(monkeypatch):
+    names = ["ppo_tasks_seed0", "ppo_tasks_seed1", "clone_wide_tasks_elbows1_seed3", "ppo_elbows2_seed0"]
+    monkeypatch.setattr(players, "shipped_policies", lambda: names)
+    found = {Entry("ppo_tasks", 2, ENV): "ppo_tasks", Entry("clone_wide_tasks", 1, ENV): "clone_wide_tasks_elbows1"}
+    assert players.learned() == {**found, Entry("ppo", 2): "ppo_elbows2"}
+    assert not set(found) & set(entries())
+    assert "ppo_tasks" in known_names(2, ENV)
+    assert "ppo_tasks" not in known_names(2)
 
 
 class Idle:

@@ -1,0 +1,60 @@
+"""Optima of the evaluation tasks: digests that outlive a processor, and a file that a run goes on from."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from agents.jobs.machines import Machines
+from benchmarks.tasks import optima as module
+from benchmarks.tasks.optima import SOLVED, UNITS, Solved, digest_of, optimal_figures, read, solve, write
+
+TASK = {"circle": {"radius": 0.1, "direction": "clockwise"}, "parameters": {"payload": 0.2}, "state": {"q": [0.3, 1.0]}}
+OTHER = {**TASK, "parameters": {"payload": 0.1}}
+
+
+@pytest.fixture
+def two_tasks(monkeypatch):
+    monkeypatch.setattr(module, "numbered_tasks", lambda _: {0: TASK, 1: OTHER})
+    monkeypatch.setattr(module, "settings_of_task", lambda elbows, task: (elbows, task["parameters"]["payload"]))
+
+
+def test_digest_is_of_the_task_but_for_the_last_digits():
+    nearly = {**TASK, "state": {"q": [0.3 + 1e-14, 1.0]}}
+    assert digest_of(2, nearly) == digest_of(2, TASK)
+    different = [digest_of(1, TASK), digest_of(2, OTHER), digest_of(2, {**TASK, "state": {"q": [0.3 + 1e-7, 1.0]}})]
+    assert len({digest_of(2, TASK), *different}) == 4
+
+
+def test_rows_of_tasks_that_have_changed_are_dropped(two_tasks, tmp_path):
+    figures = dict.fromkeys(UNITS, 1.5)
+    known = {(2, 0): Solved(digest_of(2, TASK), SOLVED, figures), (1, 1): Solved(digest_of(1, OTHER), "too far")}
+    path = tmp_path / "optima.csv"
+    write(path, {**known, (2, 1): Solved(digest_of(2, TASK), SOLVED, figures)})
+    assert read(path) == known
+    assert optimal_figures(path) == {(2, 0): figures}
+    assert read(tmp_path / "none.csv") == {}
+
+
+def test_a_run_solves_what_is_missing_and_writes_each_task_as_it_is_found(two_tasks, tmp_path, monkeypatch):
+    pytest.importorskip("casadi")
+    path, asked = tmp_path / "optima.csv", []
+    answer = SimpleNamespace(cost=30.0, figures=dict.fromkeys(UNITS, 2.0))
+
+    def bounds(settings, progress, **_):
+        asked.append(settings)
+        for k, (_, payload) in enumerate(settings):
+            progress(k, answer if payload == 0.2 else "the simulator must follow a guess")
+            assert read(path)[settings[k][0], 0 if payload == 0.2 else 1].status
+        if len(asked) == 1:
+            # What was found before a run ends is there.
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, "bounds", bounds)
+    with pytest.raises(KeyboardInterrupt):
+        solve([2], Machines(), path)
+    said = solve([2, 1], Machines(), path)
+    # A task that failed is tried again: another version may solve it.
+    assert asked == [[(2, 0.2), (2, 0.1)], [(2, 0.1), (1, 0.2), (1, 0.1)]]
+    assert optimal_figures(path)[1, 0] == {**dict.fromkeys(UNITS, 2.0), "cost": 30.0}
+    assert "task 1 with elbows 2 failed: the simulator must follow a guess" in said
+    assert said.endswith(f"2 of 4 tasks solved: {path}")
