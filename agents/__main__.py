@@ -1,8 +1,4 @@
-"""Commands of the agents: `python -m agents COMMAND`.
-
-The list is one idea and stays one file at over 300 lines: a function for each command, whose arguments and docstring are
-the command's options and help; what it does lies in the room that it calls.
-"""
+"""Commands of the agents: `python -m agents COMMAND`."""
 
 from __future__ import annotations
 
@@ -12,15 +8,11 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
-from agents.cli import Commands, Count, JsonObject, Seed
-from agents.jobs.machines import Machines
+from agents.cli import Commands, Count, Seed
 from agents.task_options import Elbows, TaskOptions
 
-On = OmitArgPrefixes[Machines]
-TASK, MACHINES = TaskOptions(), Machines()
+TASK = TaskOptions()
 app = Commands("python -m agents", "Controllers of the arm: training, evaluation, pictures, the paper's results.")
-
-NOTHING: dict[str, object] = {}
 
 
 @app.command
@@ -125,64 +117,20 @@ def evaluate(
     evaluate_all(players, task, episodes, trust, receipt)
 
 
-@app.command
-def bound(
-    elbows: tuple[int, ...] = (2,),
-    circle: JsonObject = NOTHING,
-    payload: float = 0.0,
-    start: Literal["paper", "on_target"] = "paper",
-    pose: tuple[float, ...] | None = None,
-    weights: tuple[float, float] = (1.0, 0.001),
-    environment: JsonObject = NOTHING,
-    under_table: bool | None = None,
-    fresh: bool = False,
-    starts: Count = 2,
-    output: Path | None = None,
-    machines: On = MACHINES,
-) -> None:
-    """Finds the best known solution of any task without contact, with its certificate; solved tasks are kept.
+@app.command_from
+def bound(words: Sequence[str]) -> Callable[..., None]:
+    """Finds the best known solution of any task without contact, with its certificate; solved tasks are kept."""
+    from agents.optimal.options import bound
 
-    Args:
-        elbows: Number of elbows on the table, up to 2, or joint numbers held at z = 0.
-        circle: Fields of the circle, or points of a path as its "shape".
-        payload: Mass at the hand [kg].
-        start: Start pose: "paper" for the arm's nominal one, "on_target" for one whose hand is on the circle.
-        pose: Nominal pose of the arm in place of its own [rad].
-        weights: Cost per metre of tracking error and per watt of electrical power.
-        environment: Other arguments of the environment, such as "arm", "duration" or "voltage_limit".
-        under_table: Whether joints may go below z = 0; only with two or more elbows, where they hardly do, when None.
-        fresh: Whether it is solved again, and from postures; the better solution is kept.
-        starts: Number of postures that a task from scratch is started from; more than two are all followed to the end.
-        output: File for the trajectory, .npz.
-        machines: Machines, which follow a start each.
-    """
-    from agents.optimal.command import settings_of, solve_and_print
-
-    more = {"circle": circle, "payload": payload, "start": start, **environment}
-    above_table = None if under_table is None else not under_table
-    solve_and_print(settings_of(elbows, weights, pose, more), above_table, fresh, output, starts, machines)
+    return bound
 
 
-@app.command
-def bounds(
-    tasks: Positional[Path],
-    output: Positional[Path],
-    under_table: bool | None = None,
-    starts: Count = 2,
-    machines: On = MACHINES,
-) -> None:
-    """Finds the bounds of many tasks side by side and writes a CSV; run it again to go on after an interruption.
+@app.command_from
+def bounds(words: Sequence[str]) -> Callable[..., None]:
+    """Finds the bounds of many tasks side by side and writes a CSV; run it again to go on after an interruption."""
+    from agents.optimal.options import bounds
 
-    Args:
-        tasks: JSON file: a list of objects with the arguments of one environment each.
-        output: CSV file: a row for each task.
-        under_table: As in `bound`.
-        starts: As in `bound`.
-        machines: Machines.
-    """
-    from agents.optimal.command import solve_file
-
-    solve_file(tasks, output, None if under_table is None else not under_table, machines, starts)
+    return bounds
 
 
 @app.command

@@ -31,7 +31,7 @@ Found = TypeVar("Found", Descended, Solution)
 
 COARSE, FINE = 2, 3
 """Numbers of Radau points in a control period, in the search and in the refinement."""
-THOROUGH = 3
+THOROUGH = 2
 """Number of starts from which on every one is followed to a solution."""
 FOLLOWED = 2
 """Most descents that are followed to a solution: the second where the first one's program does not converge."""
@@ -248,8 +248,8 @@ def bound(
         settings: arguments of the environment, without contact, friction, heat, supply resistance and randomisation.
         above_table: whether joints 3..n and the hand must have z >= 0; where there are fewer than two elbows if None.
         fresh: whether it is solved again, and from the postures; the cheaper solution stays in the store.
-        starts: number of postures that a task from scratch is started from. Of two the cheaper descent is followed to a
-            solution, of more all are, and the cheapest solution is taken.
+        starts: number of postures that a task from scratch is started from. Each is followed to a solution, and the
+            cheapest is taken. With one, only the cheaper descent is followed, of its and the nearest solved task's.
         machines: what follows the postures side by side, such as `Machines()`, with which a script needs its
             `if __name__ == "__main__":`; this process follows one after the other when None.
         progress: called with a line on every solve.

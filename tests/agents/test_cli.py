@@ -22,6 +22,7 @@ COMMANDS = {
         "reproduce",
         "train",
         "clone",
+        "newton",
         "sweep",
         "best",
         "publish",
@@ -34,7 +35,7 @@ COMMANDS = {
         "report",
         "watch",
     ),
-    "benchmarks": ("energy", "learning", "optimal", "planners", "speed"),
+    "benchmarks": ("energy", "learning", "optimal", "planners", "speed", "tasks"),
 }
 
 
