@@ -164,6 +164,7 @@ def tasks(
     output: Path = LATEST,
     elbows: tuple[int, ...] = (2, 1, 0),
     solve: bool = False,
+    starts: Count = 2,
     planners: bool = False,
     disturb: bool = False,
     players: Annotated[UseAppendAction[tuple[str, ...]], arg(name="with", metavar="WHAT")] = (),
@@ -181,6 +182,8 @@ def tasks(
         elbows: Elbows on the table, of 2, 1 and 0.
         solve: Whether to find the optima that are not in the file yet, instead of playing; about two minutes of CPU
             time each. Every one is written as it is found, so that an interrupted run goes on where it stopped.
+        starts: Number of postures that --solve starts a task from. Tasks that were solved from fewer are solved again,
+            and the cheaper solution stays; from 3 on every start is followed to its solution, in twice the time.
         planners: Whether the planners play, too.
         disturb: Whether everybody also plays with constants off by 10 %, sensor noise, delay, and an untold payload.
         players: Player of your own, as `python -m agents evaluate --help` says, for a row beside the others; may be
@@ -192,7 +195,7 @@ def tasks(
     if solve:
         from benchmarks.tasks.optima import solve as solve_tasks
 
-        print(solve_tasks(elbows, machines))
+        print(solve_tasks(elbows, starts, machines))
         return
     from benchmarks.tasks.run import tasks as play_tasks
 

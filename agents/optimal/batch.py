@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -21,6 +21,7 @@ def bounds(
     tasks: Sequence[Settings],
     *,
     above_table: bool | None = None,
+    fresh: bool = False,
     starts: int = 2,
     workers: int | None = None,
     machines: Machines | None = None,
@@ -35,6 +36,7 @@ def bounds(
     Args:
         tasks: arguments of `bound`.
         above_table: as in `bound`.
+        fresh: as in `bound`.
         starts: as in `bound`.
         workers: processes, one task each; as many as there are cores when None.
         machines: what solves them in place of `workers`.
@@ -49,7 +51,8 @@ def bounds(
     store.folder.mkdir(parents=True, exist_ok=True)
     with (machines or Machines(workers=workers)).pool(len(tasks)) as pool:
         for k, one in enumerate(tasks):
-            pool.submit(k, Job(partial(_bound_apart, one, above_table, starts, store), 1, f"task {k}", store.folder))
+            how = {"above_table": above_table, "fresh": fresh, "starts": starts, "store": store}
+            pool.submit(k, Job(partial(_bound_apart, one, how), 1, f"task {k}", store.folder))
         for k, answer in pool.outcomes(lambda _: None):
             if isinstance(answer, Exception) and not isinstance(answer, ChildProcessError):
                 raise answer
@@ -58,10 +61,10 @@ def bounds(
     return [found[k] for k in range(len(tasks))]
 
 
-def _bound_apart(settings: Settings, above_table: bool | None, starts: int, store: Store, tell: Tell) -> Bound | str:
-    """`bound` in a process of its own; a failure as its reason, which is no error of the others."""
+def _bound_apart(settings: Settings, how: Mapping[str, Any], tell: Tell) -> Bound | str:
+    """`bound` in a process of its own, with its options; a failure as its reason, which is no error of the others."""
     del tell
     try:
-        return bound(settings, above_table=above_table, starts=starts, store=store)
+        return bound(settings, **how)
     except (SolveError, ValueError) as error:
         return str(error)

@@ -7,7 +7,7 @@ import hashlib
 import json
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -37,7 +37,7 @@ UNITS = {
     "cpu_seconds": "s",
 }
 """Figures of an optimum and their units: energy of the whole episode, error from 2 s on, and the certificate."""
-HEADER = ("elbows", "task", "digest", "status", *(f"{name} [{unit}]" for name, unit in UNITS.items()))
+HEADER = ("elbows", "task", "digest", "status", "starts", *(f"{name} [{unit}]" for name, unit in UNITS.items()))
 DIGITS = 9
 """Significant digits of the numbers in a digest: the last ones depend on the processor."""
 
@@ -51,6 +51,8 @@ class Solved:
 
     digest: str
     status: str
+    starts: int
+    """Number of postures that the solution was sought from, the larger one of several runs."""
     figures: Mapping[str, float] = field(default_factory=dict[str, float])
     """Figures by the names of `UNITS`; none where the task is not solved."""
 
@@ -87,7 +89,7 @@ def read(path: Path = OPTIMA) -> dict[Key, Solved]:
             figures = {name: float(value) for name, value in values.items() if value}
             task = numbered_tasks(key[0]).get(key[1])
             if task is not None and row["digest"] == digest_of(key[0], task):
-                found[key] = Solved(row["digest"], row["status"], figures)
+                found[key] = Solved(row["digest"], row["status"], int(row["starts"]), figures)
     return found
 
 
@@ -96,14 +98,16 @@ def optimal_figures(path: Path = OPTIMA) -> dict[Key, Mapping[str, float]]:
     return {key: one.figures for key, one in read(path).items() if one.status == SOLVED}
 
 
-def solve(counts: Sequence[int], machines: Machines, path: Path = OPTIMA, numbers: Sequence[int] | None = None) -> str:
+def solve(counts: Sequence[int], starts: int, machines: Machines, path: Path = OPTIMA) -> str:
     """Solves the evaluation tasks that the file has no optimum of, and writes each as it is found.
+
+    Those that were solved from fewer starts are solved again; the cheaper solution stays.
 
     Args:
         counts: elbow counts, one after the other.
+        starts: number of postures, as in `agents.optimal.bound`.
         machines: what solves them; their storage, where they have one, holds the store.
         path: file of the optima.
-        numbers: numbers of the tasks; all when None.
 
     Returns:
         How many are solved, and the reasons of those that failed.
@@ -117,18 +121,18 @@ def solve(counts: Sequence[int], machines: Machines, path: Path = OPTIMA, number
         raise ValueError('casadi must be installed to solve, got none: pip install -e ".[optimal]"')
     check_writable(path.parent)
     found = read(path)
-    asked = [
-        (elbows, number)
-        for elbows in counts
-        for number in numbered_tasks(elbows)
-        if numbers is None or number in numbers
-    ]
-    todo = [key for key in asked if key not in found or found[key].status != SOLVED]
+    asked = [(elbows, number) for elbows in counts for number in numbered_tasks(elbows)]
+    todo = [key for key in asked if not _is_solved(found, key) or found[key].starts < starts]
     tasks = {key: numbered_tasks(key[0])[key[1]] for key in todo}
 
     def keep(k: int, answer: Bound | str) -> None:
-        digest = digest_of(todo[k][0], tasks[todo[k]])
-        found[todo[k]] = solved(digest, answer)
+        key = todo[k]
+        new = solved(digest_of(key[0], tasks[key]), starts, answer)
+        if _is_solved(found, key):
+            old = found[key].figures
+            better = new.status == SOLVED and new.figures["cost"] < old["cost"]
+            new = new if better else replace(found[key], starts=starts)
+        found[key] = new
         write(path, found)
         bar.update()
 
@@ -136,27 +140,39 @@ def solve(counts: Sequence[int], machines: Machines, path: Path = OPTIMA, number
     with tqdm(total=len(todo), unit="task", file=sys.stderr) as bar:
         if todo:
             settings = [settings_of_task(elbows, tasks[elbows, number]) for elbows, number in todo]
-            bounds(settings, machines=machines, progress=keep, store=store)
+            # Otherwise the store would answer with what is to be improved.
+            fresh = any(_is_solved(found, key) for key in todo)
+            bounds(settings, fresh=fresh, starts=starts, machines=machines, progress=keep, store=store)
     failed = [
         f"task {number} with elbows {elbows} failed: {found[elbows, number].status}"
         for elbows, number in asked
-        if found[elbows, number].status != SOLVED
+        if not _is_solved(found, (elbows, number))
     ]
     return "\n".join([*failed, f"{len(asked) - len(failed)} of {len(asked)} tasks solved: {path}"])
 
 
-def solved(digest: str, answer: Bound | str) -> Solved:
+def _is_solved(found: Mapping[Key, Solved], key: Key) -> bool:
+    return key in found and found[key].status == SOLVED
+
+
+def solved(digest: str, starts: int, answer: Bound | str) -> Solved:
     """What a solve tells of a task: an optimum, or the reason why there is none."""
     if isinstance(answer, str):
-        return Solved(digest, answer)
+        return Solved(digest, answer, starts)
     every = {**answer.figures, "cost": answer.cost}
-    return Solved(digest, SOLVED, {name: float(every[name]) for name in UNITS})
+    return Solved(digest, SOLVED, starts, {name: float(every[name]) for name in UNITS})
 
 
 def write(path: Path, found: Mapping[Key, Solved]) -> None:
     """Writes the file whole, most elbows first."""
     rows = [
-        [*key, one.digest, one.status, *(f"{one.figures[name]:.6g}" if one.figures else "" for name in UNITS)]
+        [
+            *key,
+            one.digest,
+            one.status,
+            one.starts,
+            *(f"{one.figures[name]:.6g}" if one.figures else "" for name in UNITS),
+        ]
         for key, one in sorted(found.items(), key=lambda item: (-item[0][0], item[0][1]))
     ]
     write_csv(path, HEADER, rows)

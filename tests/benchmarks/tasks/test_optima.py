@@ -27,9 +27,9 @@ def test_digest_is_of_the_task_but_for_the_last_digits():
 
 def test_rows_of_tasks_that_have_changed_are_dropped(two_tasks, tmp_path):
     figures = dict.fromkeys(UNITS, 1.5)
-    known = {(2, 0): Solved(digest_of(2, TASK), SOLVED, figures), (1, 1): Solved(digest_of(1, OTHER), "too far")}
+    known = {(2, 0): Solved(digest_of(2, TASK), SOLVED, 2, figures), (1, 1): Solved(digest_of(1, OTHER), "too far", 2)}
     path = tmp_path / "optima.csv"
-    write(path, {**known, (2, 1): Solved(digest_of(2, TASK), SOLVED, figures)})
+    write(path, {**known, (2, 1): Solved(digest_of(2, TASK), SOLVED, 2, figures)})
     assert read(path) == known
     assert optimal_figures(path) == {(2, 0): figures}
     assert read(tmp_path / "none.csv") == {}
@@ -51,10 +51,27 @@ def test_a_run_solves_what_is_missing_and_writes_each_task_as_it_is_found(two_ta
 
     monkeypatch.setattr(module, "bounds", bounds)
     with pytest.raises(KeyboardInterrupt):
-        solve([2], Machines(), path)
-    said = solve([2, 1], Machines(), path)
+        solve([2], 2, Machines(), path)
+    said = solve([2, 1], 2, Machines(), path)
     # A task that failed is tried again: another version may solve it.
     assert asked == [[(2, 0.2), (2, 0.1)], [(2, 0.1), (1, 0.2), (1, 0.1)]]
     assert optimal_figures(path)[1, 0] == {**dict.fromkeys(UNITS, 2.0), "cost": 30.0}
     assert "task 1 with elbows 2 failed: the simulator must follow a guess" in said
     assert said.endswith(f"2 of 4 tasks solved: {path}")
+
+
+def test_more_starts_solve_again_and_the_cheaper_solution_stays(two_tasks, tmp_path, monkeypatch):
+    pytest.importorskip("casadi")
+    path, costs, ways = tmp_path / "optima.csv", [[30.0, 20.0], [29.0, 21.0]], []
+
+    def bounds(settings, progress, fresh, starts, **_):
+        ways.append((len(settings), fresh, starts))
+        for k, cost in enumerate(costs[len(ways) - 1]):
+            progress(k, SimpleNamespace(cost=cost, figures=dict.fromkeys(UNITS, cost)))
+
+    monkeypatch.setattr(module, "bounds", bounds)
+    for starts in (2, 4, 3):
+        solve([2], starts, Machines(), path)
+    assert ways == [(2, False, 2), (2, True, 4)]
+    assert [one.figures["cost"] for one in read(path).values()] == [29.0, 20.0]
+    assert {one.starts for one in read(path).values()} == {4}
