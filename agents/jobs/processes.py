@@ -91,9 +91,10 @@ class Processes(Pool):
         if getattr(self._own, "executor", None) is not None:
             return self._own.executor.submit(_do, number, job)
         mine, its = self._context.Pipe(duplex=False)
+        # Outside of the block: with its first lock Python starts a process of its own, and lets signals in after that.
+        self._own.executor = ProcessPoolExecutor(1, self._context, _meet_parent, (its, self._life))
         with _STARTING, _as_children_start():
             before = multiprocessing.active_children()
-            self._own.executor = ProcessPoolExecutor(1, self._context, _meet_parent, (its, self._life))
             self._executors.append(self._own.executor)
             self._pipes.append(mine)
             future = self._own.executor.submit(_do, number, job)

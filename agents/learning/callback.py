@@ -139,18 +139,19 @@ class Keeper(BaseCallback):
         if model.num_timesteps == self._evaluated:
             return
         self.tick(training=True)
-        self._evaluated = model.num_timesteps
         training = {"timesteps": model.num_timesteps, "seconds": round(self._training, 1)}
         policy = policy_of(model, self._settings, **self._run.card(training))
         figures = evaluation(policy, self._settings)
         for name, value in figures.items():
             model.logger.record(f"evaluation/{name}", value)
-        self._rows.append(evaluation_row(model.num_timesteps, self._training, self._wall, figures))
-        self._run.files.write_evaluations(self._rows)
         if self._best is None or figures["return"] > self._best.card.evaluation["return"]:
             policy.card.evaluation.update(figures, seeds=list(evaluation_seeds(self._settings)))
             self._run.files.write_best(policy)
             self._best = policy
+        # Whoever is interrupted before makes the evaluation again, and has a policy in any case.
+        self._rows.append(evaluation_row(model.num_timesteps, self._training, self._wall, figures))
+        self._evaluated = model.num_timesteps
+        self._run.files.write_evaluations(self._rows)
         self._say(model.num_timesteps, figures)
         self.tick(training=False)
 

@@ -4,6 +4,7 @@ import os
 import signal
 import time
 from functools import partial
+from multiprocessing.resource_tracker import _resource_tracker
 
 import numpy as np
 import pytest
@@ -102,6 +103,14 @@ def test_killed_workers_take_no_other_job_along_and_their_own_goes_on_elsewhere(
     assert process != os.getpid()
     assert dict(os.environ) == before
     assert not signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+@pytest.mark.slow
+def test_first_worker_of_a_program_hears_no_signals():
+    # With its first lock Python starts this process of its own.
+    _resource_tracker._stop()
+    found = outcomes(Processes(1, retries=0), {0: Job(work.surroundings, 1)}, [])
+    assert {signal.SIGINT, signal.SIGTERM, signal.SIGHUP} <= set(found[0][1])
 
 
 @pytest.mark.slow

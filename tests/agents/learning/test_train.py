@@ -307,6 +307,22 @@ def test_interruption_ends_every_seed_with_a_line_each(tmp_path, monkeypatch, ca
         assert not (tmp_path / "seed1" / "run.json").exists()
 
 
+def test_run_that_was_interrupted_in_its_first_evaluation_makes_it_again(tmp_path, monkeypatch):
+    write, interrupted = RunFolder.write_best, []
+
+    def interrupt(folder, policy):
+        write(folder, policy)
+        if not interrupted:
+            interrupted.append(folder)
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(RunFolder, "write_best", interrupt)
+    run = small_run(tmp_path / "run")
+    result = train(run)
+    assert (result["finished"], result["best"] is None) == (False, False)
+    assert [row[0] for row in evaluations(run.folder)] == [0]
+
+
 def test_run_that_was_interrupted_while_it_prepared_starts_anew(tmp_path, monkeypatch):
     run = small_run(tmp_path / "run", **SAC_KILLED)
 
