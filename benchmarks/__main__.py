@@ -183,7 +183,7 @@ def tasks(
         solve: Whether to find the optima that are not in the file yet, instead of playing; about two minutes of CPU
             time each. Every one is written as it is found, so that an interrupted run goes on where it stopped.
         starts: Number of postures that --solve starts a task from. Tasks that were solved from fewer are solved again,
-            and the cheaper solution stays; from 3 on every start is followed to its solution, in twice the time.
+            and the cheaper solution stays.
         planners: Whether the planners play, too.
         disturb: Whether everybody also plays with constants off by 10 %, sensor noise, delay, and an untold payload.
         players: Player of your own, as `python -m agents evaluate --help` says, for a row beside the others; may be
