@@ -30,8 +30,8 @@ FIRST_STEPS = 250 * NUM_ENVS
 """Control periods with random actions before the first gradient step: an episode of each arm."""
 VOLTAGE_LIMIT = 8.0
 """Supply voltage in training [V]."""
-REWARD_SCALE = 10.0
-"""Rewards in training as a multiple of the environment's [-]."""
+WEIGHTS = {"tracking_weight": 10.0, "energy_weight": 0.002}
+"""Weights of the reward in training, the error's ten times and the energy's twice the environment's."""
 ALGORITHMS = {
     "tqc": (TQC, {"tau": 0.02, "top_quantiles_to_drop_per_net": 1}, {"n_quantiles": 10}),
     "crossq": (CrossQ, {}, {}),
@@ -67,14 +67,13 @@ class Averaged(Joules):
 
 
 def train(
-    steps: int = 1_500_000,
+    steps: int = 1_000_000,
     seed: int = 0,
     after_update: AfterUpdate = lambda *_: False,
     algorithm: Literal["tqc", "crossq"] = "tqc",
 ) -> Any:
     """Trains one of sb3-contrib's algorithms."""
-    weights = {name: REWARD_SCALE * getattr(SETTINGS, name) for name in ("tracking_weight", "energy_weight")}
-    env = environment(NUM_ENVS, start_noise=0.1, voltage_limit=VOLTAGE_LIMIT, **weights)
+    env = environment(NUM_ENVS, start_noise=0.1, voltage_limit=VOLTAGE_LIMIT, **WEIGHTS)
     env.seed(seed)
     arms = Interface(env.get_attr("unwrapped", 0)[0])
     kind, arguments, policy = ALGORITHMS[algorithm]
@@ -105,4 +104,4 @@ def train(
 
 if __name__ == "__main__":
     torch.set_num_threads(1)
-    main(train, 1_500_000, tuple(ALGORITHMS))
+    main(train, 1_000_000, tuple(ALGORITHMS))
