@@ -16,7 +16,7 @@ import elbow_gym
 from agents.__main__ import app as agents_app
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.trajectory import Trajectory
-from agents.learning.presets import default_settings
+from agents.learning.presets import DEFAULTS, default_settings
 from agents.shipped import OPTIMA
 from agents.style import CONTROLLER_NAMES
 from benchmarks.__main__ import app as benchmarks_app
@@ -267,7 +267,7 @@ def test_reference_point_of_the_hypervolume_is_worse_than_doing_nothing_and_than
 
 def test_training_defaults_are_the_presets():
     lines = [cells(line) for line in block("agents/README.md", "settings")[2:]]
-    assert len(lines) == 8
+    assert {(algorithm, task) for algorithm, task, *_ in lines} >= set(DEFAULTS)
     for algorithm, task, steps, arms, gamma, hidden in lines:
         settings = default_settings(algorithm, task)
         assert int(steps.replace(" ", "")) == settings.total_timesteps
@@ -281,7 +281,8 @@ def test_trials_have_distinct_ids_and_build_on_each_other():
     assert list(trials[0]) == header
     ids = [trial["id"] for trial in trials]
     assert len(set(ids)) == len(ids)
-    assert sorted({int(re.match(r"\d+", name)[0]) for name in ids}) == list(range(1, 75))
+    numbers = {int(re.match(r"\d+", name)[0]) for name in ids}
+    assert numbers == set(range(1, max(numbers) + 1))
     number = r"-?[\d.]+"
     for trial in trials:
         assert trial["base"] in {"", *ids} - {trial["id"]}
