@@ -9,15 +9,18 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from agents.cli import Count, JsonObject, Seed
 from agents.files import read_json
 from agents.learning.command import Schedule, runs_of
 from agents.learning.presets import ALGORITHMS, default_settings
-from agents.learning.run import Run
 from agents.learning.settings import AlgorithmSettings
 from agents.task_options import Elbows, EnvironmentId, TaskOptions
+
+if TYPE_CHECKING:
+    # The simulator comes with it, and the command's help is said without.
+    from agents.learning.run import Run
 
 FILE = "sweep.json"
 """File of a sweep's plan in its folder."""

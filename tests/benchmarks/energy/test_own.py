@@ -132,7 +132,7 @@ def test_score_gives_a_small_table_from_python():
 
 def test_planners_play_where_they_are_named(monkeypatch):
     found = {}
-    monkeypatch.setattr(run, "measure", lambda chosen, _: found.update(cells=chosen.cells) or [])
+    monkeypatch.setattr(run, "measure", lambda chosen, *_: found.update(cells=chosen.cells) or [])
     monkeypatch.setattr(run, "cells", lambda parts: [Cell("ppo", 2), Cell("ppo", 1)])
     for name in ("save", "check_writable"):
         monkeypatch.setattr(run, name, lambda *_: None)
