@@ -30,6 +30,8 @@ FEWEST = 5
 """Rounds whose labels are kept at the start, where half of them would be fewer."""
 STRAYS = 1.5
 """Largest labelled action, in units of the supply voltage."""
+HOPELESS = 2.0
+"""Multiple of the tasks' median cost above which an improved motion teaches nothing: an arm that has fallen, say."""
 LED = 2
 """Factor of the gradient steps after a round in which the initial policy drives."""
 
@@ -75,8 +77,8 @@ class Training:
 
         Returns:
             Means over its tasks: the policy's return and the teacher's under noise, the policy's cost and that of the
-            improved motions, smoothed both; the price of the next round [1/rad^2], and the cost of the fit's errors in
-            an episode.
+            improved motions, smoothed both; the share of tasks whose labels are kept [-], the price of the next round
+            [1/rad^2], and the cost of the fit's errors in an episode.
         """
         how, led = self._how, self.rounds < self._how.led_rounds
         smoothing = how.smoothing_at(self.rounds / how.rounds)
@@ -95,9 +97,10 @@ class Training:
         self._price = float(np.exp(np.log(price).mean()))
         again, more, rewards = self._noisy(seeds, drive, found)
         visited = (motions.states, *np.split(more.states, 2))
-        observed = np.concatenate([seen, again])
-        action = np.concatenate([self._taught(found, slice(None), states[:, :-1]) for states in visited])
-        effort = np.tile(found.law.effort, (3, 1, 1, 1)) * self._settings.voltage_limit**2
+        kept = np.tile(found.after <= HOPELESS * np.median(found.after), len(visited))
+        observed = np.concatenate([seen, again])[kept]
+        action = np.concatenate([self._taught(found, slice(None), states[:, :-1]) for states in visited])[kept]
+        effort = np.tile(found.law.effort, (len(visited), 1, 1, 1))[kept] * self._settings.voltage_limit**2
         self._window.append(
             Labels(
                 observed.reshape(-1, observed.shape[-1]),
@@ -115,6 +118,7 @@ class Training:
         self.rounds += 1
         return {
             "return": float(reward.mean()),
+            "kept": float(kept.mean()),
             "taught_return": float(rewards[how.num_envs :].mean()),
             "cost": float(before.mean()),
             "improved_cost": float(found.after.mean()),
