@@ -61,7 +61,11 @@ def tasks(
     _write_episodes(episodes, output / "tasks_episodes.csv")
     texts = {"tasks.md": table(found, known), "tasks_disturbed.md": disturbed_table(found)}
     for name, text in texts.items():
-        write_text(output / name, text)
+        if text:
+            write_text(output / name, text)
+        else:
+            # An earlier run's would be of other episodes.
+            (output / name).unlink(missing_ok=True)
     write_whole(output / "tasks.png", partial(figure, found))
     if publish:
         publish_blocks(output)

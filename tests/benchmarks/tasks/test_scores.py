@@ -97,3 +97,7 @@ def test_comparison_needs_an_optimum_and_writes_what_it_says(episodes, tmp_path,
         rows = list(csv.DictReader(handle))
     assert len(rows) == sum(map(len, episodes.values()))
     assert np.mean([float(row["energy [J]"]) for row in rows]) == 200.0
+    known = {key: of for key, of in episodes.items() if key[1] == NOMINAL}
+    monkeypatch.setattr(module, "_episodes", lambda *_: known)
+    tasks(tmp_path, [2])
+    assert not (tmp_path / "tasks_disturbed.md").exists()
