@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -14,13 +15,15 @@ from multiprocessing import connection
 from typing import Any
 
 from agents.jobs.job import Job, end_soon, perform
-from agents.jobs.pool import KILLED, Message, Pool, restarted
+from agents.jobs.pool import KILLED, PERIOD, Message, Pool, restarted
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Variables of the environment that say how many threads a process's linear algebra takes."""
 ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 """Signals that ask a process to end."""
 ENDED = 'a worker process ended by itself (a script needs `if __name__ == "__main__":` around what it does)'
+GLANCE = 0.001
+"""Time between two questions for the exit code of a process that has ended [s]."""
 _STARTING = threading.Lock()
 """Held while a process starts, which inherits what this one's environment has meanwhile."""
 
@@ -80,9 +83,9 @@ class Processes(Pool):
             self._own.executor, process = None, self._own.process
             if self._end.closed:
                 raise InterruptedError("stopped")
-            process.join()
-            if process.exitcode >= 0:
-                raise ChildProcessError(f"{ENDED}, with exit code {process.exitcode}")
+            code = exit_code(process)
+            if code is not None and code >= 0:
+                raise ChildProcessError(f"{ENDED}, with exit code {code}")
             if left:
                 self._notices.append((number, 0, restarted(job)))
         raise ChildProcessError(KILLED)
@@ -102,6 +105,20 @@ class Processes(Pool):
         # The process has its copy: with this one open, its death would not end the pipe.
         its.close()
         return future
+
+
+def exit_code(process: Any) -> int | None:
+    """A process's exit code, waiting for its end; negative, a signal's number, where it was killed.
+
+    Any thread that starts a process looks after the others. Where it does so between this one's wait and its question,
+    the code is there a moment later. None, if never: something else has taken it.
+    """
+    for _ in range(round(PERIOD / GLANCE)):
+        process.join()
+        if process.exitcode is not None:
+            break
+        time.sleep(GLANCE)
+    return process.exitcode
 
 
 _pipe: Any = None

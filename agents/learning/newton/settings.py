@@ -14,11 +14,11 @@ class NewtonSettings:
     Raises ValueError naming the argument, the rule and the value.
     """
 
-    rounds: int = 30
+    rounds: int = 40
     """Number of rounds; each draws new tasks."""
     num_envs: int = 32
     """Number of tasks in a round."""
-    newton_steps: int = 2
+    newton_steps: int = 3
     """Number of Newton's steps from the policy's motion in each task."""
     first_price: float = 12.0
     """Price of an angle's square deviation in the first step [1/rad^2]; steps that succeed make the next ones cheaper.

@@ -13,7 +13,7 @@ from agents.jobs import machines as module
 from agents.jobs.job import Job
 from agents.jobs.machines import HERE, Machines, do_all
 from agents.jobs.pool import KILLED
-from agents.jobs.processes import ENDED, ONE_THREAD, Processes
+from agents.jobs.processes import ENDED, ONE_THREAD, Processes, exit_code
 from tests.support import jobs as work
 from tests.support.workers import PoolHere, do_jobs_here
 
@@ -74,6 +74,22 @@ def test_machines_that_are_not_there_are_named(monkeypatch):
     monkeypatch.setattr(module, "find_spec", lambda _: None)
     with pytest.raises(ValueError, match=r'ray must be installed for --ray, got none: pip install -e "\.\[cluster\]"'):
         Machines(ray=HERE)
+
+
+@pytest.mark.parametrize(("codes", "expected"), [([-9], -9), ([None, None, 3], 3), ([None], None)])
+def test_exit_code_that_another_thread_has_taken_is_waited_for(codes, expected):
+    class Ended:
+        asked = 0
+
+        def join(self):
+            pass
+
+        @property
+        def exitcode(self):
+            self.asked += 1
+            return codes[min((self.asked + 1) // 2, len(codes)) - 1]
+
+    assert exit_code(Ended()) == expected
 
 
 @pytest.mark.slow
