@@ -7,6 +7,7 @@ import math
 import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -168,6 +169,7 @@ def _part(kind: type[Any], plain: object, owner: str) -> Any:
     return kind(**mapping)
 
 
+@cache
 def paper_arm() -> ArmParameters:
     """The paper's arm: ten joints, its motors, links and start pose (section 4 of the paper)."""
     turns = (0.0, 0.25, 0.5, -0.5, 0.25, 0.25, -0.5, 0.25, -0.25, 0.25)

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,8 +50,9 @@ def check_reachable(arm: ArmParameters, elbows: Sequence[int], circle: Circle) -
         )
 
 
+@lru_cache(maxsize=64)
 def extreme_points(circle: Circle) -> Array:
-    """Points (m, 3) that are out of reach whenever a point of any circle that may be drawn is.
+    """Points (m, 3) that are out of reach whenever a point of any circle that may be drawn is; read-only.
 
     Outward the shortfall is convex in the point, and the point affine in the centre (in the radial plane: in its height
     and its distance from the axis, itself convex), so that the worst centre is a corner of its box; the worst radius is
@@ -61,7 +63,7 @@ def extreme_points(circle: Circle) -> Array:
     # No wave of the path goes by with fewer than 45 samples.
     angle = np.linspace(0.0, 2.0 * np.pi, 1 + 45 * max(8, circle.path_rows // 2))
     if not set(PLACING) & set(circle.drawn):
-        return circle.position(angle)
+        return _kept(circle.position(angle))
     bounds, radius = [ends(coordinate) for coordinate in circle.center], ends(circle.radius)[-1]
     tilts, axes, wider = _tilts(circle)
     corners = [
@@ -74,7 +76,12 @@ def extreme_points(circle: Circle) -> Array:
     sides = ["xyz" if any(ends(circle.tilt)) or plane == "radial" else plane for plane in circle.planes]
     spread = radius * np.array([any(axis in side for side in sides) for axis in "xyz"])
     nearest = np.clip(0.0, [low for low, *_ in bounds] - spread, [high for *_, high in bounds] + spread)
-    return np.concatenate([*corners, nearest[None]])
+    return _kept(np.concatenate([*corners, nearest[None]]))
+
+
+def _kept(points: Array) -> Array:
+    points.flags.writeable = False
+    return points
 
 
 def _tilts(circle: Circle) -> tuple[list[float], list[float | str], float]:
