@@ -68,7 +68,10 @@ def kernel(
 
 @cache
 def _made(lanes: int, table: bool, rubbing: bool, drive: bool, exponential: bool) -> Kernel:
-    return assemble(lanes, compiled, table=table, rubbing=rubbing, drive=drive, exponential=exponential)
+    made = assemble(lanes, compiled, table=table, rubbing=rubbing, drive=drive, exponential=exponential)
+    # Poses know no switches: the plain kernel's entry does for all, and is compiled once.
+    plain = (table, rubbing, drive, exponential) == (False, False, False, True)
+    return made if plain else made._replace(project_poses=_made(lanes, False, False, False, True).project_poses)
 
 
 def assemble(lanes: int, compile_with: Entry, **switches: bool) -> Kernel:
