@@ -120,24 +120,24 @@ def optimal(
 def planners(
     output: Path = LATEST,
     drawn: Count = 10,
-    elbows: tuple[int, ...] = (2,),
-    solve: bool = False,
+    elbows: tuple[int, ...] = (2, 1, 0),
     publish: bool = False,
+    machines: OmitArgPrefixes[Machines] = MACHINES,
 ) -> None:
-    """Receding-horizon and sampling control beside PPO, computed torque and the bound, also on tasks drawn at random.
+    """Receding-horizon and sampling control beside policies, computed torque and the bound, also on evaluation tasks.
 
     Takes some minutes of CPU time; what was played with the same code is not played again.
 
     Args:
         output: Folder for the table.
-        drawn: Number of drawn tasks at each elbow count: circles, loads and starts.
-        elbows: Elbows on the table in the drawn tasks, of 0, 1 and 2.
-        solve: Whether to seek the bounds of drawn tasks that are not stored; otherwise they are left out.
+        drawn: Number of evaluation tasks at each elbow count, the first of those that are solved.
+        elbows: Elbows on the table in the evaluation tasks, of 0, 1 and 2.
         publish: Whether to write the results to benchmarks/results and the table into the README.
+        machines: Machines.
     """
     from benchmarks.planners import planners as measure_planners
 
-    print(measure_planners(output, drawn, elbows, solve, publish))
+    print(measure_planners(output, drawn, elbows, publish, machines))
 
 
 @app.command_from

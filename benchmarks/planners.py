@@ -1,4 +1,4 @@
-"""Planners beside a policy and the bound, on the nominal task and on tasks drawn at random."""
+"""Planners beside policies and the bound, on the nominal task and on the first evaluation tasks."""
 
 from __future__ import annotations
 
@@ -22,10 +22,8 @@ from agents.evaluation.players import ELBOW_COUNTS, find_player
 from agents.evaluation.recording import record
 from agents.files import write_csv, write_text
 from agents.jobs.job import Job, Tell
-from agents.jobs.machines import do_all
-from agents.optimal.batch import bounds
-from agents.optimal.problem import Problem
-from agents.optimal.store import Store
+from agents.jobs.machines import Machines, do_all
+from agents.optimal.certificate import LATER
 from agents.style import look
 from agents.tasks import plain_arguments
 from agents.workers import compile_before
@@ -34,25 +32,20 @@ from benchmarks.energy import cache
 from benchmarks.energy.markdown import significant
 from benchmarks.machine import CACHE, RESULTS
 from benchmarks.optimal import Cell, cached
-from elbow_gym.task.settings import Settings
-from elbow_gym.vector_env import ElbowArmVectorEnv
+from benchmarks.tasks import episodes
+from benchmarks.tasks.optima import numbered_tasks, optimal_figures
+from elbow_gym.suite import ENV
 
 PLAYERS = (
     "receding_horizon",
     "receding_horizon_payload",
     "sampling_mpc",
     "sampling_mpc_payload",
+    "newton_tasks",
     "ppo",
     "computed_torque",
 )
 """Players of the table."""
-SEED = 26
-"""Seed of the drawn tasks."""
-CENTER, CENTER_SPREAD = (1.5, 1.5, 0.4), 0.15
-RADIUS, PERIOD, PAYLOAD = (0.05, 0.15), (3.0, 8.0), (0.0, 0.3)
-"""Ranges of the drawn circles [m, s] and loads [kg]."""
-LATER = 2.0
-"""Time from which the hand is taken to be on its path [s]."""
 NOMINAL = "nominal"
 FIGURES = ("return [-]", "energy [J]", "error_rms [mm]", "decision [ms]", "failures [-]")
 """Figures of an episode; the error counts from `LATER` on, and a failure is a period without a plan of its own."""
@@ -60,31 +53,54 @@ HEADER = ("task", "elbows", "controller", *FIGURES, "bound [-]")
 """Columns of the CSV."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Task:
-    """An environment's arguments, from a start without noise."""
+    """The nominal task, or an evaluation task, at an elbow count."""
 
-    name: str
     elbows: int
-    arguments: dict[str, Any]
+    number: int | None = None
+    """Number of the evaluation task; None for the nominal one."""
 
     @property
-    def settings(self) -> Settings:
-        """Arguments of the environment at the default control rate."""
-        return Settings(elbows=self.elbows, **self.arguments)
+    def name(self) -> str:
+        """Name in the CSV."""
+        return NOMINAL if self.number is None else str(self.number)
 
     def bound(self) -> float | None:
-        """The best known negative return; None where none was sought or found."""
-        if self.name == NOMINAL:
+        """The best known negative return; None where none was found."""
+        if self.number is None:
             figures = cached(Cell(self.elbows, "paper"))
-        else:
-            try:
-                stored = Store().load(Problem(self.settings, self.elbows < 2))
-            except ValueError:
-                # No start pose of this task has the hand on the circle.
-                return None
-            figures = None if stored is None else stored[0]
-        return None if figures is None else float(figures["closed_loop"])
+            return None if figures is None else float(figures["closed_loop"])
+        solved = optimal_figures().get((self.elbows, self.number))
+        return None if solved is None else solved["cost"]
+
+    def play(self, player: Player) -> dict[str, float]:
+        """Figures of an episode, by the names in `FIGURES`."""
+        made: list[Timed] = []
+
+        def timed(controller: Controller) -> Controller:
+            made.append(Timed(controller))
+            return made[0]
+
+        figures = self._nominal(player, timed) if self.number is None else self._drawn(player, self.number, timed)
+        seconds, inner = (made[0].seconds, made[0].inner) if made else ([], None)
+        decision = 1e3 * np.median(seconds) if seconds else float("nan")
+        return dict(zip(FIGURES, map(float, (*figures, decision, getattr(inner, "failures", 0))), strict=True))
+
+    def _nominal(self, player: Player, timed: Any) -> tuple[float, ...]:
+        from threadpoolctl import threadpool_limits
+
+        still = {"circle": None, "start": "paper", "start_noise": 0.0, "start_spread": 0.0, "randomize": None}
+        # What threads of BLAS do besides would not be counted.
+        with threadpool_limits(1):
+            recording = record(replace(player.settings, **still), lambda env: timed(player.make(env)), [0])
+        whole, later = metrics(recording), metrics(recording, LATER)
+        return whole["return"][0], whole["electrical_energy"][0], later["error_rms"][0]
+
+    def _drawn(self, player: Player, number: int, timed: Any) -> tuple[float, ...]:
+        undisturbed = episodes.DISTURBANCES[episodes.NOMINAL]
+        figures = episodes.play(player, number, numbered_tasks(self.elbows)[number], undisturbed, timed)
+        return -figures["cost"], figures["energy"], figures["error_rms"]
 
 
 class Timed:
@@ -107,80 +123,23 @@ class Timed:
         return answer
 
 
-def drawn_tasks(count: int, elbows: int) -> list[Task]:
-    """Tasks with circles, loads and starts drawn at random, the same at every elbow count.
-
-    A task that the settings refuse at some elbow count is drawn again.
-    """
-    rng, found = np.random.default_rng(SEED), []
-    while len(found) < count:
-        center = np.array(CENTER) + rng.uniform(-CENTER_SPREAD, CENTER_SPREAD, 3)
-        circle = {
-            "center": center.round(4).tolist(),
-            "radius": round(rng.uniform(*RADIUS), 4),
-            "period": round(rng.uniform(*PERIOD), 3),
-        }
-        payload, start = round(rng.uniform(*PAYLOAD), 3), ("paper", "on_target")[rng.integers(2)]
-        arguments = {"circle": circle, "payload": payload, "start": start, "start_noise": 0.0}
-        try:
-            for bearing in sorted(ELBOW_COUNTS):
-                Settings(elbows=bearing, **arguments)
-        except ValueError:
-            continue
-        found.append(Task(str(len(found)), elbows, arguments))
-    return found
+def _player(name: str, elbows: int) -> Player:
+    try:
+        return find_player(name, elbows)
+    except ValueError:
+        return find_player(name, elbows, ENV)
 
 
-def playable(tasks: Sequence[Task], count: int) -> list[Task]:
-    """The first tasks whose start pose exists."""
-    found = []
-    for task in tasks:
-        try:
-            ElbowArmVectorEnv(1, elbows=task.elbows, **task.arguments).reset(seed=0)
-        except ValueError:
-            continue
-        found.append(task)
-    return found[:count]
-
-
-def play(task: Task, player: Player) -> dict[str, float]:
-    """Figures of an episode, by the names in `FIGURES`."""
-    from threadpoolctl import threadpool_limits
-
-    made: list[Timed] = []
-
-    def make(env: ElbowArmVectorEnv) -> Timed:
-        made.append(Timed(player.make(env)))
-        return made[0]
-
-    # What threads of BLAS do besides would not be counted.
-    with threadpool_limits(1):
-        recording = record(replace(player.settings, **task.arguments), make, [0])
-    whole, later = metrics(recording), metrics(recording, LATER)
-    figures = (
-        whole["return"][0],
-        whole["electrical_energy"][0],
-        later["error_rms"][0],
-        1e3 * np.median(made[0].seconds),
-        getattr(made[0].inner, "failures", 0),
-    )
-    return dict(zip(FIGURES, map(float, figures), strict=True))
-
-
-def _played(task: Task, name: str, folder: Path, tell: Tell) -> dict[str, float] | None:
-    """Figures of an episode, from the folder where the same was played before; None where the controller refuses it."""
-    player = find_player(name, task.elbows)
-    question = {"player": player.identity, "settings": plain_arguments(player.settings), "task": task.arguments}
+def _played(task: Task, name: str, folder: Path, tell: Tell) -> dict[str, float]:
+    """Figures of an episode, from the folder where the same was played before."""
+    player = _player(name, task.elbows)
+    options = None if task.number is None else numbered_tasks(task.elbows)[task.number]
+    question = {"player": player.identity, "settings": plain_arguments(player.settings), "planners": options}
     key = cache.key(json.loads(json.dumps(question)))
     stored = cache.load(key, folder)
     tell(1)
     if stored is None:
-        try:
-            figures = play(task, player)
-        except ValueError:
-            # Computed torque moves its hand with the last two links alone, which do not cover every circle.
-            return None
-        stored = {NOMINAL: {figure: np.array([value]) for figure, value in figures.items()}}
+        stored = {NOMINAL: {figure: np.array([value]) for figure, value in task.play(player).items()}}
         cache.store(key, stored, folder)
     return {figure: float(values[0]) for figure, values in stored[NOMINAL].items()}
 
@@ -189,18 +148,18 @@ def planners(
     output: Path,
     drawn: int,
     elbows: Sequence[int],
-    solve: bool = False,
     publish: bool = False,
+    machines: Machines | None = None,
     folder: Path = CACHE,
 ) -> str:
-    """Plays `PLAYERS` on the nominal tasks and on drawn ones; writes planners.csv and .md. Returns the table.
+    """Plays `PLAYERS` on the nominal tasks and on evaluation tasks; writes planners.csv and .md. Returns the table.
 
     Args:
         output: folder of the results, unless they are published.
-        drawn: number of drawn tasks at each elbow count.
-        elbows: elbow counts of the drawn tasks.
-        solve: whether bounds of drawn tasks that were not sought before are sought now.
+        drawn: number of evaluation tasks at each elbow count, the first ones that are solved.
+        elbows: elbow counts of the evaluation tasks.
         publish: whether the results go to benchmarks/results, and the table into the README.
+        machines: what plays.
         folder: folder of what was played before.
 
     Raises:
@@ -210,18 +169,15 @@ def planners(
 
     if find_spec("casadi") is None:
         raise ValueError('casadi must be installed for the planners: pip install "elbow-gym[optimal]"')
-    output = RESULTS if publish else output
-    tasks = [Task(NOMINAL, count, {"start_noise": 0.0}) for count in ELBOW_COUNTS]
+    output, solved = RESULTS if publish else output, sorted(optimal_figures())
+    tasks = [Task(count) for count in ELBOW_COUNTS]
     for count in elbows:
-        # A task whose start pose cannot reach its circle is passed over.
-        tasks += playable(drawn_tasks(2 * drawn, count), drawn)
-    players = [find_player(name, count) for name in PLAYERS for count in ELBOW_COUNTS]
+        tasks += [Task(count, number) for of, number in solved if of == count][:drawn]
+    players = [_player(name, count) for name in PLAYERS for count in ELBOW_COUNTS]
     compile_before([*((player.settings, 1) for player in players), *(player.settings for player in players)])
     jobs = {(task, name): Job(partial(_played, task, name, folder), 1) for task in tasks for name in PLAYERS}
     with tqdm(total=len(jobs), unit="episode", file=sys.stderr) as bar:
-        played = do_all(jobs, bar.update)
-    if solve:
-        bounds([task.settings for task in tasks if task.name != NOMINAL])
+        played = do_all(jobs, bar.update, machines)
     known = {task: task.bound() for task in tasks}
     rows = [
         [
@@ -229,10 +185,9 @@ def planners(
             task.elbows,
             name,
             *(f"{figures[figure]:.6g}" for figure in FIGURES),
-            "" if known[task] is None else f"{-known[task]:.6g}",
+            "" if (bound := known[task]) is None else f"{-bound:.6g}",
         ]
         for (task, name), figures in played.items()
-        if figures is not None
     ]
     write_csv(output / "planners.csv", HEADER, rows)
     text = table(rows)

@@ -101,7 +101,13 @@ TOLD: dict[str, Callable[[ElbowArmVectorEnv, float], Controller]] = {
 """Makers of the classical controllers for a task with a payload [kg]: they need a posture that reaches the circle."""
 
 
-def play(player: Player, number: int, task: Mapping[str, Any], disturbance: Disturbance) -> dict[str, float]:
+def play(
+    player: Player,
+    number: int,
+    task: Mapping[str, Any],
+    disturbance: Disturbance,
+    around: Callable[[Controller], Controller] = lambda controller: controller,
+) -> dict[str, float]:
     """Figures of a player's episode by the names of `UNITS`.
 
     The controller is made for the task in an undisturbed environment. An episode that it refuses, or that ends early,
@@ -112,6 +118,7 @@ def play(player: Player, number: int, task: Mapping[str, Any], disturbance: Dist
         number: seed of what the disturbance draws.
         task: options of a reset, as `elbow_gym.evaluation_tasks` has them.
         disturbance: difference between the arm and what the controller takes it for.
+        around: puts a controller of the caller's around the player's.
     """
     from threadpoolctl import threadpool_limits
 
@@ -121,7 +128,7 @@ def play(player: Player, number: int, task: Mapping[str, Any], disturbance: Dist
         undisturbed = ElbowArmVectorEnv(1, **alone.arguments)
         payload = task["parameters"]["payload"] if disturbance.told else 0.0
         told = TOLD.get(player.name)
-        inner = player.make(undisturbed) if told is None else told(undisturbed, payload)
+        inner = around(player.make(undisturbed) if told is None else told(undisturbed, payload))
         layout, names = undisturbed.episodes.layout, env.episodes.layout.names
         hides = layout.task and not disturbance.told
         hidden = layout.slices["payload"].start if hides else None

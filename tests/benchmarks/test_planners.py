@@ -1,4 +1,4 @@
-"""Planners' table: tasks drawn in a fixed order, rows that are the players' own, and means."""
+"""Planners' table: rows that are the players' own on the nominal and the first evaluation tasks, and means."""
 
 from dataclasses import replace
 
@@ -10,28 +10,11 @@ from agents.evaluation.player import player_of
 from agents.evaluation.players import find_player
 from agents.evaluation.recording import record
 from benchmarks import planners as module
-from benchmarks.planners import FIGURES, HEADER, NOMINAL, Task, drawn_tasks, planners, play, playable, table
+from benchmarks.planners import FIGURES, HEADER, NOMINAL, Task, planners, table
+from benchmarks.tasks import episodes
+from benchmarks.tasks.optima import numbered_tasks, optimal_figures
+from elbow_gym.suite import ENV
 from elbow_gym.task.settings import Settings
-from elbow_gym.vector_env import ElbowArmVectorEnv
-
-
-def test_more_tasks_are_the_same_tasks_and_some_others_at_every_elbow_count():
-    few, many = drawn_tasks(3, 2), drawn_tasks(6, 0)
-    assert [task.arguments for task in few] == [task.arguments for task in many[:3]]
-    assert {task.elbows for task in few} == {2}
-    for task in many:
-        circle = Settings(elbows=0, **task.arguments).parsed_circle
-        assert np.abs(np.array(circle.center) - (1.5, 1.5, 0.4)).max() <= 0.15
-        assert 0.0 <= task.arguments["payload"] <= 0.3
-        assert task.arguments["start_noise"] == 0.0
-
-
-def test_tasks_without_a_start_pose_are_passed_over():
-    far = Task("far", 2, {"circle": {"center": [1.5, 1.5, 0.75], "radius": 0.1}, "start": "on_target"})
-    with pytest.raises(ValueError, match="position must be within reach"):
-        ElbowArmVectorEnv(1, elbows=2, **far.arguments).reset(seed=0)
-    near = Task("near", 2, {})
-    assert playable([far, near, near], 1) == [near]
 
 
 class Still:
@@ -46,18 +29,33 @@ class Still:
         return np.zeros((self.num_envs, 10), np.float32), None
 
 
-def test_figures_are_the_players_own_episode():
-    player = player_of("still", find_player("ppo", 2).settings, Still)
-    found = play(Task(NOMINAL, 2, {"start_noise": 0.0, "duration": 2.1}), player)
-    expected = metrics(record(replace(player.settings, start_noise=0.0, duration=2.1), Still, [0]))
+def test_figures_of_the_nominal_task_are_the_players_own_episode():
+    player = player_of("still", replace(find_player("ppo", 2).settings, duration=2.1), Still)
+    found = Task(2).play(player)
+    expected = metrics(record(replace(player.settings, start_noise=0.0), Still, [0]))
     assert found["return [-]"] == expected["return"][0]
     assert found["energy [J]"] == expected["electrical_energy"][0]
     assert found["decision [ms]"] > 0.0
     assert found["failures [-]"] == 3.0
 
 
-def test_bound_of_the_nominal_task_is_the_shipped_optimums():
-    assert Task(NOMINAL, 2, {}).bound() == pytest.approx(30.1, abs=0.1)
+def test_policy_of_drawn_tasks_plays_the_nominal_circle_too():
+    player = find_player("newton_tasks", 2, ENV)
+    assert Task(2).play(player)["return [-]"] > 1.05 * -Task(2).bound()
+
+
+def test_figures_of_an_evaluation_task_are_those_of_its_comparison():
+    player = player_of("still", Settings(duration=2.1), Still)
+    found = Task(2, 3).play(player)
+    expected = episodes.play(player, 3, numbered_tasks(2)[3], episodes.DISTURBANCES[episodes.NOMINAL])
+    assert (found["return [-]"], found["energy [J]"]) == (-expected["cost"], expected["energy"])
+    assert found["decision [ms]"] > 0.0
+
+
+def test_bounds_are_the_shipped_optima():
+    assert Task(2).bound() == pytest.approx(30.1, abs=0.1)
+    assert Task(2, 3).bound() == optimal_figures()[2, 3]["cost"]
+    assert Task(2, 1000).bound() is None
 
 
 def test_planners_table_is_made_of_its_rows_and_episodes_are_played_once(tmp_path, monkeypatch):
@@ -65,24 +63,21 @@ def test_planners_table_is_made_of_its_rows_and_episodes_are_played_once(tmp_pat
     counted = []
     monkeypatch.setattr(module, "PLAYERS", ("ppo",))
     monkeypatch.setattr(module, "ELBOW_COUNTS", (2,))
-    monkeypatch.setattr(module, "do_all", lambda jobs, tell: {key: job.work(tell) for key, job in jobs.items()})
+    monkeypatch.setattr(module, "do_all", lambda jobs, tell, _: {key: job.work(tell) for key, job in jobs.items()})
 
     def played(task, player):
         counted.append(task.name)
-        if task.name == "1":
-            raise ValueError("position must be within reach")
         return dict.fromkeys(FIGURES, 1.5)
 
-    monkeypatch.setattr(module, "play", played)
+    monkeypatch.setattr(Task, "play", played)
     for _ in range(2):
         text = planners(tmp_path / "out", 2, (2,), folder=tmp_path / "cache")
-    assert counted == [NOMINAL, "0", "1", "1"]
+    assert counted == [NOMINAL, "0", "1"]
     assert (tmp_path / "out" / "planners.md").read_text() == text
     rows = (tmp_path / "out" / "planners.csv").read_text().splitlines()
     assert rows[0].split(",") == list(HEADER)
     assert rows[1].startswith("nominal,2,ppo,1.5,1.5,1.5,1.5,1.5,-30")
-    # A controller that refuses a task has no row there.
-    assert [row.split(",")[0] for row in rows[1:]] == [NOMINAL, "0"]
+    assert [row.split(",")[0] for row in rows[1:]] == [NOMINAL, "0", "1"]
 
 
 def test_table_has_nominal_rows_and_means_of_the_drawn_ones():
