@@ -295,7 +295,7 @@ def test_trials_have_distinct_ids_and_build_on_each_other():
 def test_lessons_name_trials_that_are_there():
     lessons = PAGES["agents/README.md"].split("### What the trials taught")[1].split("\n## ")[0]
     named = [
-        name for names in re.findall(r"\((\d+[a-f]?(?:,\s+\d+[a-f]?)*)\)", lessons) for name in re.split(r",\s+", names)
+        name for names in re.findall(r"\((\d+[a-z]?(?:,\s+\d+[a-z]?)*)\)", lessons) for name in re.split(r",\s+", names)
     ]
     ids = {trial["id"] for trial in rows(RESULTS / "trials.csv")}
     assert len(named) > 20
