@@ -44,7 +44,7 @@ CONTROLLER_NAMES = {
     "lqr": "LQR on the optimum",
     "ppo": "PPO, 24 V",
     "sac": "SAC from computed torque",
-    "clone": "clone of the optimum",
+    "clone": "clone of one optimum",
     "ppo_cloned": "PPO from the optimum's clone",
     "ppo_random": "PPO, drawn arms and circles",
     "sac_cloned": "SAC from the optimum's clone",
