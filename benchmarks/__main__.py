@@ -126,7 +126,7 @@ def planners(
 ) -> None:
     """Receding-horizon and sampling control beside policies, computed torque and the bound, also on evaluation tasks.
 
-    Takes some minutes of CPU time; what was played with the same code is not played again.
+    Takes half an hour of CPU time; what was played with the same code is not played again.
 
     Args:
         output: Folder for the table.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from agents.control.controller import Controller
 from agents.evaluation.metrics import metrics
 from agents.evaluation.player import Player
-from agents.evaluation.players import ELBOW_COUNTS, find_player
+from agents.evaluation.players import ELBOW_COUNTS, Entry, find_player
 from agents.evaluation.recording import record
 from agents.files import write_csv, write_text
 from agents.jobs.job import Job, Tell
@@ -36,19 +36,22 @@ from benchmarks.tasks import episodes
 from benchmarks.tasks.optima import numbered_tasks, optimal_figures
 from elbow_gym.suite import ENV
 
+DRAWN = "newton_tasks"
+"""Policy of drawn tasks."""
 PLAYERS = (
     "receding_horizon",
     "receding_horizon_payload",
     "sampling_mpc",
     "sampling_mpc_payload",
-    "newton_tasks",
+    DRAWN,
     "ppo",
     "computed_torque",
 )
 """Players of the table."""
 NOMINAL = "nominal"
 FIGURES = ("return [-]", "energy [J]", "error_rms [mm]", "decision [ms]", "failures [-]")
-"""Figures of an episode; the error counts from `LATER` on, and a failure is a period without a plan of its own."""
+"""Figures of an episode; the error counts from `LATER` on, and a failure is a period without a plan of its own. An
+episode that a controller refuses has the worst figures, and decisions of no time."""
 HEADER = ("task", "elbows", "controller", *FIGURES, "bound [-]")
 """Columns of the CSV."""
 
@@ -84,7 +87,7 @@ class Task:
 
         figures = self._nominal(player, timed) if self.number is None else self._drawn(player, self.number, timed)
         seconds, inner = (made[0].seconds, made[0].inner) if made else ([], None)
-        decision = 1e3 * np.median(seconds) if seconds else float("nan")
+        decision = 1e3 * np.median(seconds) if seconds else 0.0
         return dict(zip(FIGURES, map(float, (*figures, decision, getattr(inner, "failures", 0))), strict=True))
 
     def _nominal(self, player: Player, timed: Any) -> tuple[float, ...]:
@@ -124,10 +127,7 @@ class Timed:
 
 
 def _player(name: str, elbows: int) -> Player:
-    try:
-        return find_player(name, elbows)
-    except ValueError:
-        return find_player(name, elbows, ENV)
+    return Entry(name, elbows, ENV).player() if name == DRAWN else find_player(name, elbows)
 
 
 def _played(task: Task, name: str, folder: Path, tell: Tell) -> dict[str, float]:

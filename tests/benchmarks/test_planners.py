@@ -52,6 +52,20 @@ def test_figures_of_an_evaluation_task_are_those_of_its_comparison():
     assert found["decision [ms]"] > 0.0
 
 
+def test_task_that_a_controller_refuses_has_the_worst_figures(tmp_path, monkeypatch):
+    def refuse(env):
+        raise ValueError("position must be within reach")
+
+    player = replace(player_of("still", Settings(duration=2.1), refuse), identity="still")
+    monkeypatch.setattr(module, "_player", lambda name, elbows: player)
+    found = module._played(Task(2, 3), "still", tmp_path, lambda _: None)
+    assert found["return [-]"] < -100.0
+    assert found["decision [ms]"] == 0.0
+    # What is stored is taken over: it must be finite.
+    monkeypatch.setattr(Task, "play", None)
+    assert module._played(Task(2, 3), "still", tmp_path, lambda _: None) == found
+
+
 def test_bounds_are_the_shipped_optima():
     assert Task(2).bound() == pytest.approx(30.1, abs=0.1)
     assert Task(2, 3).bound() == optimal_figures()[2, 3]["cost"]

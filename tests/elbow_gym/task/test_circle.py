@@ -154,6 +154,8 @@ def test_a_link_longer_than_the_others_together_leaves_a_hole_around_the_base():
 
 def test_path_is_sampled_at_each_degree_and_45_times_a_wave_where_there_are_more_than_eight():
     assert len(extreme_points(Circle())) == 361
+    # One array for all who ask.
+    assert not extreme_points(Circle()).flags.writeable
     points = [(1.0 + 0.1 * math.cos(k), 1.0 + 0.1 * math.sin(k), 0.4) for k in range(40)]
     assert len(extreme_points(Circle(shape=points))) == 1 + 45 * 20
 
