@@ -163,6 +163,7 @@ def speed(words: Sequence[str]) -> Callable[..., None]:
 def tasks(
     output: Path = LATEST,
     elbows: tuple[int, ...] = (2, 1, 0),
+    seed: int | None = None,
     solve: bool = False,
     starts: Count = 2,
     planners: bool = False,
@@ -172,14 +173,15 @@ def tasks(
     publish: bool = False,
     machines: OmitArgPrefixes[Machines] = MACHINES,
 ) -> None:
-    """How far every player stays from the optimum of each evaluation task of ElbowArmTasks-v0.
+    """How far every player stays from the optimum of each evaluation task of ElbowArmTasks-v0, or of other ones.
 
     Some minutes of CPU time, with the planners some hours; what was played with the same code is not played again. The
-    optima are those in benchmarks/results/tasks_optima.csv.
+    optima are those in benchmarks/results/tasks_optima.csv, of other tasks in tasks_SEED_optima.csv.
 
     Args:
         output: Folder for the tables and the figure.
         elbows: Elbows on the table, of 2, 1 and 0.
+        seed: Seed of the first of fifty other tasks; the evaluation tasks when None.
         solve: Whether to find the optima that are not in the file yet, instead of playing; about two minutes of CPU
             time each. Every one is written as it is found, so that an interrupted run goes on where it stopped.
         starts: Number of postures that --solve starts a task from. Tasks that were solved from fewer are solved again,
@@ -192,14 +194,17 @@ def tasks(
         publish: Whether to write the results to benchmarks/results and the table into the README.
         machines: Machines.
     """
+    from benchmarks.tasks.task_set import EVALUATION, TaskSet
+
+    drawn = EVALUATION if seed is None else TaskSet(seed)
     if solve:
         from benchmarks.tasks.optima import solve as solve_tasks
 
-        print(solve_tasks(elbows, starts, machines))
+        print(solve_tasks(elbows, starts, machines, drawn))
         return
     from benchmarks.tasks.run import tasks as play_tasks
 
-    print(play_tasks(output, elbows, players, planners, disturb, trust, publish, machines))
+    print(play_tasks(output, elbows, players, planners, disturb, trust, publish, machines, drawn))
 
 
 if __name__ == "__main__":

@@ -33,7 +33,8 @@ from benchmarks.energy.markdown import significant
 from benchmarks.machine import CACHE, RESULTS
 from benchmarks.optimal import Cell, cached
 from benchmarks.tasks import episodes
-from benchmarks.tasks.optima import numbered_tasks, optimal_figures
+from benchmarks.tasks.optima import optimal_figures
+from benchmarks.tasks.task_set import EVALUATION
 from elbow_gym.suite import ENV
 
 DRAWN = "newton_tasks"
@@ -102,7 +103,7 @@ class Task:
 
     def _drawn(self, player: Player, number: int, timed: Any) -> tuple[float, ...]:
         undisturbed = episodes.DISTURBANCES[episodes.NOMINAL]
-        figures = episodes.play(player, number, numbered_tasks(self.elbows)[number], undisturbed, timed)
+        figures = episodes.play(player, number, EVALUATION.numbered(self.elbows)[number], undisturbed, timed)
         return -figures["cost"], figures["energy"], figures["error_rms"]
 
 
@@ -133,7 +134,7 @@ def _player(name: str, elbows: int) -> Player:
 def _played(task: Task, name: str, folder: Path, tell: Tell) -> dict[str, float]:
     """Figures of an episode, from the folder where the same was played before."""
     player = _player(name, task.elbows)
-    options = None if task.number is None else numbered_tasks(task.elbows)[task.number]
+    options = None if task.number is None else EVALUATION.numbered(task.elbows)[task.number]
     question = {"player": player.identity, "settings": plain_arguments(player.settings), "planners": options}
     key = cache.key(json.loads(json.dumps(question)))
     stored = cache.load(key, folder)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from numbers import Integral
 from typing import Any
 
 import gymnasium as gym
@@ -41,23 +42,26 @@ def reset_options(info: Mapping[str, Any]) -> dict[str, Any]:
     return options
 
 
-def evaluation_tasks(elbows: int = 2) -> list[dict[str, Any]]:
-    """The fifty evaluation tasks as options of a reset of `ElbowArmTasks-v0`, in plain JSON types.
+def evaluation_tasks(elbows: int = 2, seeds: Sequence[int] = EVALUATION_SEEDS) -> list[dict[str, Any]]:
+    """The fifty evaluation tasks, or those of other seeds, as options of a reset of `ElbowArmTasks-v0`.
 
-    Each has `circle` with all of its fields but the shape, `parameters` with the payload [kg] alone, and `state` with
-    the start pose q [rad]. They are what resets with `EVALUATION_SEEDS` draw.
+    Each has, in plain JSON types, `circle` with all of its fields but the shape, `parameters` with the payload [kg]
+    alone, and `state` with the start pose q [rad]. They are what resets with the seeds draw.
 
     Args:
         elbows: number of elbows on the table, 0, 1 or 2.
+        seeds: seeds of the resets, one for each task. From below 2**31 a training may have drawn one of them.
 
     Raises:
-        ValueError: elbows is another number.
+        ValueError: elbows is another number, there are no seeds, or one is not an integer of at least 0.
     """
     if elbows not in (0, 1, 2) or isinstance(elbows, bool):
         raise ValueError(f"elbows must be 0, 1 or 2, got {elbows!r}")
-    arms: Any = gym.make_vec(ENV, num_envs=len(EVALUATION_SEEDS), elbows=elbows)
-    _, infos = arms.reset(seed=list(EVALUATION_SEEDS))
+    if not seeds or not all(isinstance(seed, Integral) and seed >= 0 for seed in seeds):
+        raise ValueError(f"seeds must be integers of at least 0, one or more, got {seeds!r}")
+    arms: Any = gym.make_vec(ENV, num_envs=len(seeds), elbows=elbows)
+    _, infos = arms.reset(seed=list(seeds))
     drawn = unmasked(infos)
     arms.close()
-    tasks = [reset_options(of_arm(drawn, i)) for i in range(len(EVALUATION_SEEDS))]
+    tasks = [reset_options(of_arm(drawn, i)) for i in range(len(seeds))]
     return [{**task, "parameters": {"payload": task["parameters"]["payload"]}} for task in tasks]

@@ -27,7 +27,7 @@ ALIKE = 0.2
 """Largest difference of an angle up to which two postures are one [rad]."""
 NOISE = 0.5
 """Standard deviation of a random posture's idle joints [rad]."""
-TRIES = 20
+TRIES = 100
 """Random poses that are tried for each guess, at most."""
 REACH_TIME = 1.0
 """Time of a guess from the start to its posture [s]."""

@@ -8,7 +8,6 @@ import json
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -20,10 +19,8 @@ from agents.optimal.certificate import Bound
 from agents.optimal.store import Store
 from agents.tasks import settings_of_task
 from benchmarks.machine import RESULTS
-from elbow_gym.suite import evaluation_tasks
+from benchmarks.tasks.task_set import EVALUATION, TaskSet
 
-OPTIMA = RESULTS / "tasks_optima.csv"
-"""File of the optima."""
 SOLVED = "solved"
 """Status of a task whose optimum is known; that of others is the reason why it is not."""
 UNITS = {
@@ -57,12 +54,6 @@ class Solved:
     """Figures by the names of `UNITS`; none where the task is not solved."""
 
 
-@cache
-def numbered_tasks(elbows: int) -> dict[int, dict[str, Any]]:
-    """The evaluation tasks of an elbow count by their numbers from 0 on."""
-    return dict(enumerate(evaluation_tasks(elbows)))
-
-
 def digest_of(elbows: int, task: Mapping[str, Any]) -> str:
     """Digest of a task's reset options, to `DIGITS` digits of its numbers, and of its elbow count."""
 
@@ -77,8 +68,13 @@ def digest_of(elbows: int, task: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def read(path: Path = OPTIMA) -> dict[Key, Solved]:
-    """The rows of a file, without those of other tasks than today's; none where there is no file."""
+def file_of(tasks: TaskSet, folder: Path = RESULTS) -> Path:
+    """File of a set's optima in a folder."""
+    return folder / f"{tasks.name}_optima.csv"
+
+
+def read(path: Path, tasks: TaskSet = EVALUATION) -> dict[Key, Solved]:
+    """The rows of a file, without those of other tasks than the set's; none where there is no file."""
     if not path.is_file():
         return {}
     found = {}
@@ -87,19 +83,22 @@ def read(path: Path = OPTIMA) -> dict[Key, Solved]:
             key = int(row["elbows"]), int(row["task"])
             values = {name: row[f"{name} [{unit}]"] for name, unit in UNITS.items()}
             figures = {name: float(value) for name, value in values.items() if value}
-            task = numbered_tasks(key[0]).get(key[1])
+            task = tasks.numbered(key[0]).get(key[1])
             if task is not None and row["digest"] == digest_of(key[0], task):
                 found[key] = Solved(row["digest"], row["status"], int(row["starts"]), figures)
     return found
 
 
-def optimal_figures(path: Path = OPTIMA) -> dict[Key, Mapping[str, float]]:
-    """Figures of the solved tasks."""
-    return {key: one.figures for key, one in read(path).items() if one.status == SOLVED}
+def optimal_figures(tasks: TaskSet = EVALUATION, path: Path | None = None) -> dict[Key, Mapping[str, float]]:
+    """Figures of the solved tasks of a set, from its own file when no other is given."""
+    known = read(file_of(tasks) if path is None else path, tasks)
+    return {key: one.figures for key, one in known.items() if one.status == SOLVED}
 
 
-def solve(counts: Sequence[int], starts: int, machines: Machines, path: Path = OPTIMA) -> str:
-    """Solves the evaluation tasks that the file has no optimum of, and writes each as it is found.
+def solve(
+    counts: Sequence[int], starts: int, machines: Machines, tasks: TaskSet = EVALUATION, path: Path | None = None
+) -> str:
+    """Solves the tasks of a set that the file has no optimum of, and writes each as it is found.
 
     Those that were solved from fewer starts are solved again; the cheaper solution stays.
 
@@ -107,7 +106,8 @@ def solve(counts: Sequence[int], starts: int, machines: Machines, path: Path = O
         counts: elbow counts, one after the other.
         starts: number of postures, as in `agents.optimal.bound`.
         machines: what solves them; their storage, where they have one, holds the store.
-        path: file of the optima.
+        tasks: the set.
+        path: file of the optima; the set's own when None.
 
     Returns:
         How many are solved, and the reasons of those that failed.
@@ -119,15 +119,16 @@ def solve(counts: Sequence[int], starts: int, machines: Machines, path: Path = O
 
     if find_spec("casadi") is None:
         raise ValueError('casadi must be installed to solve, got none: pip install -e ".[optimal]"')
+    path = file_of(tasks) if path is None else path
     check_writable(path.parent)
-    found = read(path)
-    asked = [(elbows, number) for elbows in counts for number in numbered_tasks(elbows)]
+    found = read(path, tasks)
+    asked = [(elbows, number) for elbows in counts for number in tasks.numbered(elbows)]
     todo = [key for key in asked if not _is_solved(found, key) or found[key].starts < starts]
-    tasks = {key: numbered_tasks(key[0])[key[1]] for key in todo}
+    options = {key: tasks.numbered(key[0])[key[1]] for key in todo}
 
     def keep(k: int, answer: Bound | str) -> None:
         key = todo[k]
-        new = solved(digest_of(key[0], tasks[key]), starts, answer)
+        new = solved(digest_of(key[0], options[key]), starts, answer)
         if _is_solved(found, key):
             old = found[key].figures
             better = new.status == SOLVED and new.figures["cost"] < old["cost"]
@@ -139,7 +140,7 @@ def solve(counts: Sequence[int], starts: int, machines: Machines, path: Path = O
     store = None if machines.storage is None else Store(machines.place(Path("bounds")))
     with tqdm(total=len(todo), unit="task", file=sys.stderr) as bar:
         if todo:
-            settings = [settings_of_task(elbows, tasks[elbows, number]) for elbows, number in todo]
+            settings = [settings_of_task(elbows, options[elbows, number]) for elbows, number in todo]
             # Otherwise the store would answer with what is to be improved.
             fresh = any(_is_solved(found, key) for key in todo)
             bounds(settings, fresh=fresh, starts=starts, machines=machines, progress=keep, store=store)

@@ -15,9 +15,10 @@ from benchmarks.blocks import publish_blocks
 from benchmarks.machine import CACHE, RESULTS
 from benchmarks.tasks.contenders import Contender, contenders
 from benchmarks.tasks.episodes import DISTURBANCES, NOMINAL, UNITS, played
-from benchmarks.tasks.optima import OPTIMA, numbered_tasks, optimal_figures
+from benchmarks.tasks.optima import file_of, optimal_figures
 from benchmarks.tasks.report import disturbed_table, figure, table, write_scores
 from benchmarks.tasks.scores import Episodes, Key, scores
+from benchmarks.tasks.task_set import EVALUATION, TaskSet
 
 
 def tasks(
@@ -29,10 +30,11 @@ def tasks(
     trust: bool = False,
     publish: bool = False,
     machines: Machines | None = None,
-    optima: Path = OPTIMA,
+    drawn: TaskSet = EVALUATION,
+    optima: Path | None = None,
     folder: Path = CACHE,
 ) -> str:
-    """Plays everybody on the evaluation tasks that are solved; writes tables, CSV and a figure. Returns the tables.
+    """Plays everybody on the tasks of a set that are solved; writes tables, CSV and a figure. Returns the tables.
 
     Args:
         output: folder of the results, unless they are published.
@@ -43,46 +45,53 @@ def tasks(
         trust: whether files that may run code when they are read may be read.
         publish: whether the results go to benchmarks/results, and the tables into the README.
         machines: what plays.
-        optima: file of the optima.
+        drawn: the set.
+        optima: file of the optima; the set's own when None.
         folder: folder of what was played before.
 
     Raises:
         ValueError: no task is solved, or a player of the user's own plays at none of the elbow counts.
     """
-    known = {key: of for key, of in optimal_figures(optima).items() if key[0] in elbows}
+    known = {key: figures for key, figures in optimal_figures(drawn, optima).items() if key[0] in elbows}
     if not known:
-        raise ValueError(f"{optima} must hold an optimum for the elbows {list(elbows)}, got none; --solve finds them")
+        path = optima or file_of(drawn)
+        raise ValueError(f"{path} must hold an optimum for the elbows {list(elbows)}, got none; --solve finds them")
     lineup = contenders([count for count in elbows if any(key[0] == count for key in known)], guests, planners, trust)
     names = list(DISTURBANCES) if disturb else [NOMINAL]
-    episodes = _episodes(lineup, names, list(known), machines, folder)
+    episodes = _episodes(drawn, lineup, names, list(known), machines, folder)
     found = scores(episodes, known)
     output = RESULTS if publish else output
-    write_scores(found, output / "tasks.csv")
-    _write_episodes(episodes, output / "tasks_episodes.csv")
-    texts = {"tasks.md": table(found, known), "tasks_disturbed.md": disturbed_table(found)}
+    write_scores(found, output / f"{drawn.name}.csv")
+    _write_episodes(episodes, output / f"{drawn.name}_episodes.csv")
+    texts = {f"{drawn.name}.md": table(found, known), f"{drawn.name}_disturbed.md": disturbed_table(found)}
     for name, text in texts.items():
         if text:
             write_text(output / name, text)
         else:
             # An earlier run's would be of other episodes.
             (output / name).unlink(missing_ok=True)
-    write_whole(output / "tasks.png", partial(figure, found))
+    write_whole(output / f"{drawn.name}.png", partial(figure, found))
     if publish:
         publish_blocks(output)
     return "\n".join(text for text in texts.values() if text)
 
 
 def _episodes(
-    lineup: Sequence[Contender], names: Sequence[str], keys: Sequence[Key], machines: Machines | None, folder: Path
+    drawn: TaskSet,
+    lineup: Sequence[Contender],
+    names: Sequence[str],
+    keys: Sequence[Key],
+    machines: Machines | None,
+    folder: Path,
 ) -> Episodes:
-    """Figures of everybody's episodes in some tasks under some disturbances."""
+    """Figures of everybody's episodes in some tasks of a set under some disturbances."""
     from tqdm import tqdm
 
     settings = [one.player().settings for one in lineup]
     compile_before((one, 1) for one in settings)
     jobs = {}
     for one in lineup:
-        tasks = {number: numbered_tasks(one.elbows)[number] for elbows, number in keys if elbows == one.elbows}
+        tasks = {number: drawn.numbered(one.elbows)[number] for elbows, number in keys if elbows == one.elbows}
         for name in names:
             jobs[one, name] = Job(partial(played, one, tasks, name, folder), len(tasks), f"{one.name}, {name}")
     with tqdm(total=sum(job.size for job in jobs.values()), unit="episode", file=sys.stderr) as bar:

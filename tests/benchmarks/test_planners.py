@@ -12,7 +12,8 @@ from agents.evaluation.recording import record
 from benchmarks import planners as module
 from benchmarks.planners import FIGURES, HEADER, NOMINAL, Task, planners, table
 from benchmarks.tasks import episodes
-from benchmarks.tasks.optima import numbered_tasks, optimal_figures
+from benchmarks.tasks.optima import optimal_figures
+from benchmarks.tasks.task_set import EVALUATION
 from elbow_gym.suite import ENV
 from elbow_gym.task.settings import Settings
 
@@ -47,7 +48,7 @@ def test_policy_of_drawn_tasks_plays_the_nominal_circle_too():
 def test_figures_of_an_evaluation_task_are_those_of_its_comparison():
     player = player_of("still", Settings(duration=2.1), Still)
     found = Task(2, 3).play(player)
-    expected = episodes.play(player, 3, numbered_tasks(2)[3], episodes.DISTURBANCES[episodes.NOMINAL])
+    expected = episodes.play(player, 3, EVALUATION.numbered(2)[3], episodes.DISTURBANCES[episodes.NOMINAL])
     assert (found["return [-]"], found["energy [J]"]) == (-expected["cost"], expected["energy"])
     assert found["decision [ms]"] > 0.0
 

@@ -47,6 +47,7 @@ def test_an_info_and_the_evaluation_tasks_set_a_task_again_bit_for_bit(elbows):
         assert same(again[:2], drawn[:2])
         for name in ("circle", "start"):
             assert same(dict(again[2][name]), dict(drawn[2][name]))
+    assert evaluation_tasks(elbows, [5, EVALUATION_SEEDS[k]])[1] == evaluation_tasks(elbows)[k]
     assert not same(played(env, seed=3)[0], drawn[0])
 
 
@@ -202,6 +203,12 @@ def test_a_pose_that_cannot_be_spread_above_the_table_is_refused_with_the_reset(
 def test_evaluation_tasks_are_those_of_the_papers_elbow_counts(elbows):
     with pytest.raises(ValueError, match=r"^elbows must be 0, 1 or 2, got "):
         evaluation_tasks(elbows)
+
+
+@pytest.mark.parametrize("seeds", [[], [-1], [0.5]])
+def test_tasks_of_other_seeds_need_some_and_valid_ones(seeds):
+    with pytest.raises(ValueError, match=r"^seeds must be integers of at least 0, one or more, got "):
+        evaluation_tasks(2, seeds)
 
 
 @each_count

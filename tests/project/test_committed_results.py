@@ -29,6 +29,7 @@ from benchmarks.energy import cells as lineup
 from benchmarks.machine import RESULTS
 from benchmarks.optimal import DEFAULT_WEIGHT, FRONT_WEIGHTS, Cell, cached, cells, files
 from benchmarks.tasks import optima
+from benchmarks.tasks.task_set import EVALUATION
 from elbow_gym import ElbowArmEnv
 from elbow_gym.baselines import policy as baselines
 from elbow_gym.baselines.policy import pair, read_policy
@@ -151,9 +152,9 @@ def test_receipts_of_the_pd_are_of_the_committed_figures():
 
 
 def test_optima_of_the_evaluation_tasks_are_of_todays_tasks_and_certified():
-    with optima.OPTIMA.open() as handle:
+    with optima.file_of(EVALUATION).open() as handle:
         rows = list(csv.DictReader(handle))
-    found = optima.read()
+    found = optima.read(optima.file_of(EVALUATION))
     # A row of another task than today's is not read.
     assert len(found) == len(rows)
     for known in optima.optimal_figures().values():

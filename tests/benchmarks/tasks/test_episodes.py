@@ -11,7 +11,7 @@ from agents.evaluation.players import find_player
 from agents.tasks import task_settings
 from benchmarks.tasks.contenders import Contender, contenders
 from benchmarks.tasks.episodes import DISTURBANCES, NOMINAL, UNITS, play, played, worst
-from benchmarks.tasks.optima import numbered_tasks
+from benchmarks.tasks.task_set import EVALUATION
 from elbow_gym import ElbowArmEnv
 from elbow_gym.suite import ENV
 
@@ -46,7 +46,7 @@ def still(elbows=2):
 
 
 def test_a_policy_of_one_circle_plays_the_task_as_its_environment_does_after_a_reset_with_the_options():
-    player, task = shortened(find_player("ppo", 2)), numbered_tasks(2)[3]
+    player, task = shortened(find_player("ppo", 2)), EVALUATION.numbered(2)[3]
     env = ElbowArmEnv(**player.settings.arguments)
     observation, _ = env.reset(seed=0, options=task)
     policy, rewards, over = player.make(env), [], False
@@ -60,7 +60,7 @@ def test_a_policy_of_one_circle_plays_the_task_as_its_environment_does_after_a_r
 
 
 def test_payload_is_observed_unless_nobody_is_told():
-    task = numbered_tasks(2)[3]
+    task = EVALUATION.numbered(2)[3]
     layout = gym.make(ENV).unwrapped.episodes.layout
     for disturbance, expected in ((DISTURBANCES[NOMINAL], task["parameters"]["payload"]), (UNTOLD, 0.0)):
         player, made = still()
@@ -71,7 +71,7 @@ def test_payload_is_observed_unless_nobody_is_told():
 
 
 def test_a_controller_knows_nothing_of_what_disturbs_it():
-    task, sizes = numbered_tasks(2)[3], set()
+    task, sizes = EVALUATION.numbered(2)[3], set()
     runs = {}
     for name in (NOMINAL, "delay", "noise", "constants"):
         player, made = still()
@@ -90,7 +90,7 @@ def test_who_refuses_a_task_has_the_worst_episode():
         raise ValueError("position must be within reach")
 
     settings = task_settings("ElbowArm-v0", 0)
-    found = play(player_of("nobody", settings, refuse), 0, numbered_tasks(0)[0], DISTURBANCES[NOMINAL])
+    found = play(player_of("nobody", settings, refuse), 0, EVALUATION.numbered(0)[0], DISTURBANCES[NOMINAL])
     assert found == worst(settings)
     assert found["complete"] == 0.0
     # The cost is that of the error and the energy, by the reward's prices.
@@ -101,7 +101,7 @@ def test_who_refuses_a_task_has_the_worst_episode():
 
 def test_what_was_played_is_not_played_again_unless_another_player_may_have_its_name(tmp_path):
     entry = contenders([2])[3]
-    tasks, told = {3: numbered_tasks(2)[3]}, []
+    tasks, told = {3: EVALUATION.numbered(2)[3]}, []
     first = played(entry, tasks, NOMINAL, tmp_path, told.append)
     kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     assert played(entry, tasks, NOMINAL, tmp_path, told.append) == first

@@ -11,6 +11,7 @@ from benchmarks.tasks.episodes import NOMINAL, UNITS
 from benchmarks.tasks.report import disturbed_table, figure, table, write_scores
 from benchmarks.tasks.run import tasks
 from benchmarks.tasks.scores import scores
+from benchmarks.tasks.task_set import TaskSet
 
 OPTIMA = {(2, number): {"cost": 10.0 + number, "energy": 100.0, "error_rms": 1.0} for number in range(10)}
 
@@ -88,7 +89,7 @@ def test_tables_and_figure_are_of_the_scores(episodes, tmp_path):
 def test_comparison_needs_an_optimum_and_writes_what_it_says(episodes, tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=r"none\.csv must hold an optimum for the elbows \[2\], got none; --solve"):
         tasks(tmp_path, [2], optima=tmp_path / "none.csv")
-    monkeypatch.setattr(module, "optimal_figures", lambda _: OPTIMA)
+    monkeypatch.setattr(module, "optimal_figures", lambda *_: OPTIMA)
     monkeypatch.setattr(module, "_episodes", lambda *_: episodes)
     text = tasks(tmp_path, [2])
     assert text.startswith((tmp_path / "tasks.md").read_text())
@@ -101,3 +102,6 @@ def test_comparison_needs_an_optimum_and_writes_what_it_says(episodes, tmp_path,
     monkeypatch.setattr(module, "_episodes", lambda *_: known)
     tasks(tmp_path, [2])
     assert not (tmp_path / "tasks_disturbed.md").exists()
+    tasks(tmp_path, [2], drawn=TaskSet(7))
+    assert (tmp_path / "tasks_7.md").read_text() == (tmp_path / "tasks.md").read_text()
+    assert (tmp_path / "tasks_7.csv").is_file()
