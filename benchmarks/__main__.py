@@ -175,7 +175,7 @@ def tasks(
 ) -> None:
     """How far every player stays from the optimum of each evaluation task of ElbowArmTasks-v0, or of other ones.
 
-    Some minutes of CPU time, with the planners some hours; what was played with the same code is not played again. The
+    Some minutes of CPU time without the planners; what was played with the same code is not played again. The
     optima are those in benchmarks/results/tasks_optima.csv, of other tasks in tasks_SEED_optima.csv.
 
     Args:
@@ -186,7 +186,7 @@ def tasks(
             time each. Every one is written as it is found, so that an interrupted run goes on where it stopped.
         starts: Number of postures that --solve starts a task from. Tasks that were solved from fewer are solved again,
             and the cheaper solution stays.
-        planners: Whether the planners play, too.
+        planners: Whether the planners play, too, those that estimate the payload, and undisturbed: an hour of CPU time.
         disturb: Whether everybody also plays with constants off by 10 %, sensor noise, delay, and an untold payload.
         players: Player of your own, as `python -m agents evaluate --help` says, for a row beside the others; may be
             given several times, with one LABEL= for the training seeds of one.

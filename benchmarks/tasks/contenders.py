@@ -15,6 +15,8 @@ PD = "pd"
 CLASSICAL = (PD, "computed_torque", "computed_torque_posture")
 SPECIALISTS = ("ppo", "sac", "clone")
 """Policies of one circle."""
+TOLD_PLANNERS = tuple(name for name in PLANNERS if name.endswith("_payload"))
+"""Planners that estimate the payload, which policies of drawn tasks are told."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,11 @@ class Contender:
     """Seed of the training; None where nothing was trained, or where it is not known."""
     trust: bool = False
     """Whether a file that may run code when it is read may be read."""
+
+    @property
+    def slow(self) -> bool:
+        """Whether an episode takes it more than ten seconds of CPU time."""
+        return self.name in PLANNERS
 
     def player(self) -> Player:
         """The player.
@@ -52,7 +59,7 @@ def contenders(
     Args:
         counts: numbers of elbows on the table.
         guests: players of the user's own, WHAT or LABEL=WHAT, several with one label as its training seeds.
-        planners: whether the planners play.
+        planners: whether `TOLD_PLANNERS` play.
         trust: whether files that may run code when they are read may be read.
 
     Raises:
@@ -77,7 +84,7 @@ def contenders(
 
 
 def _registered(elbows: int, planners: bool) -> list[Contender]:
-    names = (*CLASSICAL, *(PLANNERS if planners else ()))
+    names = (*CLASSICAL, *(TOLD_PLANNERS if planners else ()))
     policies = [Entry(name, elbows) for name in SPECIALISTS]
     policies += [entry for entry in learned() if (entry.elbows, entry.env) == (elbows, ENV)]
     found = [Contender(name, elbows, Entry(name, elbows)) for name in names]

@@ -69,12 +69,16 @@ def _interval(estimate: Estimate) -> str:
 
 
 def disturbed_table(found: Sequence[Score]) -> str:
-    """What each disturbance costs each player, in percent of the optimum's cost; empty where none was played."""
+    """What each disturbance costs each player, in percent of the optimum's cost; empty where none was played.
+
+    Players that played undisturbed alone are left out.
+    """
     names = [name for name in DISTURBANCES if name != NOMINAL and any(name in one.losses for one in found)]
     if not names:
         return ""
     lines = [("elbows", "controller", *names)]
-    lines += [(str(one.elbows), look(one.name)[0], *(_interval(one.losses[name]) for name in names)) for one in found]
+    for one in (one for one in found if one.losses):
+        lines.append((str(one.elbows), look(one.name)[0], *(_interval(one.losses[name]) for name in names)))
     return pipes(lines)
 
 

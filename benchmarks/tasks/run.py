@@ -40,7 +40,7 @@ def tasks(
         output: folder of the results, unless they are published.
         elbows: elbow counts.
         guests: players of the user's own, WHAT or LABEL=WHAT.
-        planners: whether the planners play.
+        planners: whether the planners play, undisturbed.
         disturb: whether everybody also plays under the `DISTURBANCES`.
         trust: whether files that may run code when they are read may be read.
         publish: whether the results go to benchmarks/results, and the tables into the README.
@@ -92,7 +92,7 @@ def _episodes(
     jobs = {}
     for one in lineup:
         tasks = {number: drawn.numbered(one.elbows)[number] for elbows, number in keys if elbows == one.elbows}
-        for name in names:
+        for name in names[:1] if one.slow else names:
             jobs[one, name] = Job(partial(played, one, tasks, name, folder), len(tasks), f"{one.name}, {name}")
     with tqdm(total=sum(job.size for job in jobs.values()), unit="episode", file=sys.stderr) as bar:
         return do_all(jobs, bar.update, machines)

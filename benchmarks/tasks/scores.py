@@ -37,7 +37,7 @@ class Score:
     failures: int
     """Episodes that were refused, ended early, or cost more than the PD's of the same task."""
     losses: Mapping[str, Estimate]
-    """Median increase of the cost by each disturbance, as a share of the optimum's cost [-]."""
+    """Median increase of the cost by each disturbance that it played under, as a share of the optimum's cost [-]."""
 
     @property
     def median(self) -> Estimate:
@@ -76,6 +76,8 @@ def _arrays(episodes: Episodes, name: str, numbers: Sequence[int]) -> dict[str, 
     found: dict[str, dict[str, Array]] = {}
     for disturbance in dict.fromkeys(key[1] for key in episodes):
         seeds = [of for (one, way), of in episodes.items() if (one.name, way) == (name, disturbance)]
+        if not seeds:
+            continue
         found[disturbance] = {
             figure: np.array([[of[number][figure] for number in numbers] for of in seeds]) for figure in UNITS
         }

@@ -113,6 +113,9 @@ def test_what_was_played_is_not_played_again_unless_another_player_may_have_its_
 def test_everybody_plays_with_all_training_seeds_and_policies_where_their_elbows_are():
     found = contenders([2, 1])
     assert [one.name for one in found if one.elbows == 1][:3] == ["pd", "computed_torque", "computed_torque_posture"]
+    assert not any(one.slow for one in found)
+    slow = [one.name for one in contenders([1], planners=True) if one.slow]
+    assert slow == ["receding_horizon_payload", "sampling_mpc_payload"]
     for name in ("ppo", "sac", "clone"):
         assert [one.seed for one in found if (one.name, one.elbows) == (name, 2)] == [0, 1, 2, 3, 4]
     path = "elbow_gym/baselines/policies/ppo_elbows1_seed3"

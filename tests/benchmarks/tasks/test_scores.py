@@ -86,6 +86,14 @@ def test_tables_and_figure_are_of_the_scores(episodes, tmp_path):
     assert imread(tmp_path / "tasks.png").shape[1] > 150 * 4
 
 
+def test_who_played_undisturbed_alone_has_a_gap_and_no_loss(episodes):
+    planner = Contender("sampling_mpc_payload", 2)
+    found = scores({**episodes, (planner, NOMINAL): episodes_of(relative(1.15))}, OPTIMA)
+    assert [one.name for one in found] == ["ppo", planner.name, "pd"]
+    assert found[1].losses == {}
+    assert [text.count("MPC") for text in (table(found, OPTIMA), disturbed_table(found))] == [1, 0]
+
+
 def test_comparison_needs_an_optimum_and_writes_what_it_says(episodes, tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=r"none\.csv must hold an optimum for the elbows \[2\], got none; --solve"):
         tasks(tmp_path, [2], optima=tmp_path / "none.csv")
