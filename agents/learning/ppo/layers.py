@@ -18,14 +18,21 @@ class Activation(NamedTuple):
     value: Callable[[Tensor], Tensor]
     """Value at x."""
     backward: Callable[[Tensor, Tensor, Tensor], Tensor]
-    """Derivative with respect to x, from that with respect to the value, x and the value."""
+    """Derivative with respect to x, from that with respect to the value, whose memory it takes, x and the value."""
 
 
 ACTIVATIONS: dict[type[nn.Module], Activation] = {
-    nn.SiLU: Activation(functional.silu, lambda slope, x, _: _aten.silu_backward(slope, x)),
-    nn.Tanh: Activation(torch.tanh, lambda slope, _, y: _aten.tanh_backward(slope, y)),
-    nn.ReLU: Activation(torch.relu, lambda slope, _, y: _aten.threshold_backward(slope, y, 0.0)),
-    nn.ELU: Activation(functional.elu, lambda slope, x, _: _aten.elu_backward(slope, 1.0, 1.0, 1.0, False, x)),
+    nn.SiLU: Activation(
+        functional.silu, lambda slope, x, _: _aten.silu_backward.grad_input(slope, x, grad_input=slope)
+    ),
+    nn.Tanh: Activation(torch.tanh, lambda slope, _, y: _aten.tanh_backward.grad_input(slope, y, grad_input=slope)),
+    nn.ReLU: Activation(
+        torch.relu, lambda slope, _, y: _aten.threshold_backward.grad_input(slope, y, 0.0, grad_input=slope)
+    ),
+    nn.ELU: Activation(
+        functional.elu,
+        lambda slope, x, _: _aten.elu_backward.grad_input(slope, 1.0, 1.0, 1.0, False, x, grad_input=slope),
+    ),
 }
 """Functions by torch's modules with their default arguments."""
 
@@ -54,15 +61,15 @@ class Layers:
         return functional.linear(self._inputs[-1], self._linear[-1].weight, self._linear[-1].bias)
 
     def backward(self, slope: Tensor) -> None:
-        """Writes the gradients of the parameters of the last call of `forward`.
+        """Writes the gradients of the parameters of the last call of `forward`, whose values it gives back as it goes.
 
         Args:
             slope: derivative of a loss with respect to the outputs, shape (B, outputs).
         """
         for k in reversed(range(len(self._linear))):
-            layer = self._linear[k]
-            torch.mm(slope.t(), self._inputs[k], out=layer.weight.grad)
+            layer, value = self._linear[k], self._inputs.pop()
+            torch.mm(slope.t(), value, out=layer.weight.grad)
             torch.sum(slope, 0, out=layer.bias.grad)
             if k:
                 slope = torch.mm(slope, layer.weight)
-                slope = self._activations[k - 1].backward(slope, self._sums[k - 1], self._inputs[k])
+                slope = self._activations[k - 1].backward(slope, self._sums.pop(), value)
