@@ -35,9 +35,13 @@ _SAC_SLOW = SACSettings(
 )
 DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
     ("ppo", "elbows2"): replace(_PPO_BRACED, start_noise=0.1),
+    # Longer steps of the policy in fewer passes: as many control periods until the PD is beaten, in three quarters of the
+    # time, and the same return in the end. With two elbows or none they are no gain.
     ("ppo", "elbows1"): replace(
         _PPO,
         total_timesteps=5_000_000,
+        n_epochs=5,
+        clip_range=0.3,
         start_noise=0.1,
         first_energy_share=3.0,
         energy_share_until=0.6,
