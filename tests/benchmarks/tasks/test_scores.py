@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.tasks import run as module
 from benchmarks.tasks.contenders import Contender
-from benchmarks.tasks.episodes import NOMINAL, UNITS
+from benchmarks.tasks.episodes import DISTURBANCES, NOMINAL, UNITS
 from benchmarks.tasks.report import disturbed_table, figure, table, write_scores
 from benchmarks.tasks.run import tasks
 from benchmarks.tasks.scores import scores
@@ -92,6 +92,28 @@ def test_who_played_undisturbed_alone_has_a_gap_and_no_loss(episodes):
     assert [one.name for one in found] == ["ppo", planner.name, "pd"]
     assert found[1].losses == {}
     assert [text.count("MPC") for text in (table(found, OPTIMA), disturbed_table(found))] == [1, 0]
+
+
+def test_planners_play_undisturbed_alone_and_everybody_the_tasks_of_the_set(tmp_path, monkeypatch):
+    pytest.importorskip("casadi")
+    asked = {}
+
+    def stop(jobs, *_):
+        asked.update(jobs)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, "optimal_figures", lambda *_: OPTIMA)
+    monkeypatch.setattr(module, "compile_before", lambda *_: None)
+    monkeypatch.setattr(module, "do_all", stop)
+    drawn = TaskSet(7)
+    with pytest.raises(KeyboardInterrupt):
+        tasks(tmp_path, [2], planners=True, disturb=True, drawn=drawn)
+    ways = {one.name: [name for other, name in asked if other == one] for one, _ in asked}
+    assert ways["pd"] == list(DISTURBANCES)
+    assert ways["sampling_mpc_payload"] == ways["receding_horizon_payload"] == [NOMINAL]
+    (job,) = (job for (one, name), job in asked.items() if (one.name, name) == ("pd", "delay"))
+    assert job.size == len(OPTIMA)
+    assert job.work.args[1] == {number: drawn.numbered(2)[number] for _, number in OPTIMA}
 
 
 def test_comparison_needs_an_optimum_and_writes_what_it_says(episodes, tmp_path, monkeypatch):
