@@ -55,7 +55,7 @@ class FlatAdam:
 
     def clip(self, longest: float) -> None:
         """Scales the gradient down to a norm of `longest`, as torch's `clip_grad_norm_` does."""
-        norm = self.gradient.norm().item()
+        norm = torch.linalg.vector_norm(self.gradient).item()
         if norm > longest:
             self.gradient.mul_(longest / (norm + 1e-6))
 

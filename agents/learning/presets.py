@@ -34,8 +34,7 @@ _SAC_SLOW = SACSettings(
     log_std_init=-3.0,
 )
 DEFAULTS: dict[tuple[str, str], AlgorithmSettings] = {
-    # Five passes instead of six: as many control periods until the PD is beaten, in a tenth less time.
-    ("ppo", "elbows2"): replace(_PPO_BRACED, start_noise=0.1, n_epochs=5),
+    ("ppo", "elbows2"): replace(_PPO_BRACED, start_noise=0.1),
     # Longer steps of the policy in fewer passes: as many control periods until the PD is beaten, in three quarters of
     # the time, and the same return in the end. With two elbows longer steps are no gain.
     ("ppo", "elbows1"): replace(

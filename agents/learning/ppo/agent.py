@@ -13,7 +13,7 @@ from stable_baselines3.common.utils import explained_variance
 from agents.learning.actor import actor_layers
 from agents.learning.flat_adam import FlatAdam
 from agents.learning.ppo.layers import Layers
-from agents.learning.ppo.loss import Batch, log_prob, surrogate
+from agents.learning.ppo.loss import Batch, Spread, log_prob, surrogate
 
 
 class PPO(stable_baselines3.PPO):
@@ -55,7 +55,7 @@ class PPO(stable_baselines3.PPO):
             (actor, critic), log_std = self._networks(), self.policy.log_std
             departure = torch.randn(buffer.actions.shape)
             noise = log_std.exp() * departure
-            buffer.log_probs[:] = log_prob(departure, log_std)
+            buffer.log_probs[:] = log_prob(departure, Spread.of(log_std))
             for k in range(n_rollout_steps):
                 buffer.observations[k], buffer.episode_starts[k] = self._last_obs, self._last_episode_starts
                 action = actor.forward(torch.from_numpy(self._last_obs)).add_(noise[k]).numpy()
@@ -102,9 +102,10 @@ class PPO(stable_baselines3.PPO):
         figures: list[tuple[float, ...]] = []
         diverged = False
         with torch.no_grad():
+            spread = Spread.of(log_std)
             for epoch in range(self.n_epochs):
                 for batch in self._batches():
-                    descent = surrogate(actor.forward(batch.observation), log_std, batch, clip_range)
+                    descent = surrogate(actor.forward(batch.observation), spread, batch, clip_range)
                     actor.backward(descent.mean)
                     if log_std.requires_grad:
                         torch.sub(descent.log_std, self.ent_coef, out=log_std.grad)
@@ -118,6 +119,8 @@ class PPO(stable_baselines3.PPO):
                             break
                     optimizer.clip(self.max_grad_norm)
                     optimizer.step()
+                    if log_std.requires_grad:
+                        spread = Spread.of(log_std)
                 self._n_updates += 1
                 if diverged:
                     break

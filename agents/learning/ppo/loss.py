@@ -24,15 +24,28 @@ class Batch(NamedTuple):
     """Returns that the critic should have predicted [return], shape (B,)."""
 
 
-def log_prob(departure: Tensor, log_std: Tensor) -> Tensor:
+class Spread(NamedTuple):
+    """Standard deviations of normally distributed actions, in the forms that every batch needs."""
+
+    inverse: Tensor
+    """Inverses of the standard deviations [-], shape (n,)."""
+    constant: Tensor
+    """What the log-probability of the mean action is below zero [-], shape ()."""
+
+    @classmethod
+    def of(cls, log_std: Tensor) -> Spread:
+        """From the natural logarithms of the standard deviations, shape (n,)."""
+        return cls((-log_std).exp(), (log_std + 0.5 * math.log(2.0 * math.pi)).sum())
+
+
+def log_prob(departure: Tensor, spread: Spread) -> Tensor:
     """Log-probabilities of normally distributed actions [-], shape (B,).
 
     Args:
         departure: actions less their means, in standard deviations [-], shape (B, n).
-        log_std: natural logarithms of the standard deviations, shape (n,).
+        spread: standard deviations.
     """
-    constant = (log_std + 0.5 * math.log(2.0 * math.pi)).sum()
-    return departure.square().sum(-1).mul_(-0.5).sub_(constant)
+    return departure.square().sum(-1).mul_(-0.5).sub_(spread.constant)
 
 
 class Surrogate(NamedTuple):
@@ -61,20 +74,19 @@ class Surrogate(NamedTuple):
         return -torch.minimum(*self.loss).mean().item(), clipped.item(), divergence.item()
 
 
-def surrogate(mean: Tensor, log_std: Tensor, batch: Batch, clip_range: float) -> Surrogate:
+def surrogate(mean: Tensor, spread: Spread, batch: Batch, clip_range: float) -> Surrogate:
     """Loss that falls no further once an action's probability has changed by `clip_range` for the better.
 
     Args:
         mean: means of the actions [-], shape (B, n).
-        log_std: natural logarithms of the actions' standard deviations, shape (n,).
+        spread: the actions' standard deviations.
         batch: control periods.
         clip_range: largest change of an action's probability ratio that the loss rewards [-].
     """
-    inverse = (-log_std).exp()
-    departure = (batch.action - mean).mul_(inverse)
-    log_ratio = log_prob(departure, log_std).sub_(batch.log_prob)
+    departure = (batch.action - mean).mul_(spread.inverse)
+    log_ratio = log_prob(departure, spread).sub_(batch.log_prob)
     ratio = log_ratio.exp()
     free, held = batch.advantage * ratio, batch.advantage * ratio.clamp(1.0 - clip_range, 1.0 + clip_range)
     # Where the clipped value is the lower one, the loss does not depend on the action's probability.
     slope = torch.where(free <= held, free, 0.0).div_(-len(free)).unsqueeze(-1)
-    return Surrogate((departure * slope).mul_(inverse), departure, slope, log_ratio, (free, held))
+    return Surrogate((departure * slope).mul_(spread.inverse), departure, slope, log_ratio, (free, held))
