@@ -29,7 +29,7 @@ from benchmarks.energy import cells as lineup
 from benchmarks.machine import RESULTS
 from benchmarks.optimal import DEFAULT_WEIGHT, FRONT_WEIGHTS, Cell, cached, cells, files
 from benchmarks.tasks import optima
-from benchmarks.tasks.task_set import EVALUATION
+from benchmarks.tasks.task_set import EVALUATION, TaskSet
 from elbow_gym import ElbowArmEnv
 from elbow_gym.baselines import policy as baselines
 from elbow_gym.baselines.policy import pair, read_policy
@@ -151,13 +151,14 @@ def test_receipts_of_the_pd_are_of_the_committed_figures():
             assert interquartile_mean(joules).value == pytest.approx(expected, rel=1e-5)
 
 
-def test_optima_of_the_evaluation_tasks_are_of_todays_tasks_and_certified():
-    with optima.file_of(EVALUATION).open() as handle:
+@pytest.mark.parametrize("drawn", [EVALUATION, TaskSet(770_000)])
+def test_optima_of_drawn_tasks_are_of_todays_tasks_and_certified(drawn):
+    with optima.file_of(drawn).open() as handle:
         rows = list(csv.DictReader(handle))
-    found = optima.read(optima.file_of(EVALUATION))
+    found = optima.read(optima.file_of(drawn), drawn)
     # A row of another task than today's is not read.
     assert len(found) == len(rows)
-    for known in optima.optimal_figures().values():
+    for known in optima.optimal_figures(drawn).values():
         assert known["cost"] > 0.001 * known["energy"] / 0.02
         assert known["stationarity"] <= certificate.STATIONARITY
         assert known["mesh_change"] <= certificate.REFINEMENT

@@ -181,6 +181,20 @@ def test_figures_in_the_readmes_prose_are_those_of_the_committed_results(claim):
         assert float(quoted) == pytest.approx(round(value, decimals), abs=1e-9), claim
 
 
+def test_gaps_on_tasks_of_other_seeds_are_told_as_they_were_played():
+    text = " ".join(prose("benchmarks/README.md").split())
+    three = r"([\d.]+), ([\d.]+) and ([\d.]+) %"
+    (quoted,) = re.findall(
+        rf"{three} above the optima in the median with two, one and no elbow, {three} at the 90th", text
+    )
+    played = rows(RESULTS / "tasks_770000.csv")
+    table = {int(row["elbows"]): row for row in played if row["controller"] == "newton_tasks"}
+    told = [float(table[elbows][f"gap_{name} [-]"]) for name in ("median", "tail") for elbows in (2, 1, 0)]
+    for figure, gap in zip(quoted, told, strict=True):
+        assert float(figure) == pytest.approx(100.0 * gap, abs=0.0501)
+    assert {(row["tasks [-]"], row["failures [-]"]) for row in table.values()} == {("50", "0")}
+
+
 def test_prose_of_the_readme_has_at_most_a_dozen_figures_and_all_are_compared():
     figures = re.findall(r"(?<![\w.])\d[\d.,]*", prose("README.md"))
     assert len(figures) == sum(claim.count("{}") for claim in CLAIMS) <= 12
