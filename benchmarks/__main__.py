@@ -182,7 +182,7 @@ def tasks(
         output: Folder for the tables and the figure.
         elbows: Elbows on the table, of 2, 1 and 0.
         seed: Seed of the first of fifty other tasks; the evaluation tasks when None.
-        solve: Whether to find the optima that are not in the file yet, instead of playing; about two minutes of CPU
+        solve: Whether to find the optima that are not in the file yet, instead of playing; about 25 to 50 s of CPU
             time each. Every one is written as it is found, so that an interrupted run goes on where it stopped.
         starts: Number of postures that --solve starts a task from. Tasks that were solved from fewer are solved again,
             and the cheaper solution stays.
@@ -191,7 +191,7 @@ def tasks(
         players: Player of your own, as `python -m agents evaluate --help` says, for a row beside the others; may be
             given several times, with one LABEL= for the training seeds of one.
         trust: Whether to read a .zip, whose pickles can run any code when they are read.
-        publish: Whether to write the results to benchmarks/results and the table into the README.
+        publish: Whether to write the results to benchmarks/results and the evaluation tasks' table into the README.
         machines: Machines.
     """
     from benchmarks.tasks.task_set import EVALUATION, TaskSet

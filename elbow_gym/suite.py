@@ -57,7 +57,7 @@ def evaluation_tasks(elbows: int = 2, seeds: Sequence[int] = EVALUATION_SEEDS) -
     """
     if elbows not in (0, 1, 2) or isinstance(elbows, bool):
         raise ValueError(f"elbows must be 0, 1 or 2, got {elbows!r}")
-    if not seeds or not all(isinstance(seed, Integral) and seed >= 0 for seed in seeds):
+    if len(seeds) == 0 or not all(isinstance(seed, Integral) and seed >= 0 for seed in seeds):
         raise ValueError(f"seeds must be integers of at least 0, one or more, got {seeds!r}")
     arms: Any = gym.make_vec(ENV, num_envs=len(seeds), elbows=elbows)
     _, infos = arms.reset(seed=list(seeds))

@@ -18,7 +18,7 @@ OTHER_ARM = (
     "Here the same PD with the same gains drives another arm or leans on other joints, so that a verdict says nothing "
     "for or against the paper. The paper's published numbers hold for its arm alone and are left out."
 )
-"""What a verdict on another arm says before the statements."""
+"""Beginning of a verdict on another arm, before the statements."""
 
 
 @dataclass(frozen=True, kw_only=True)

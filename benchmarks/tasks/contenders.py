@@ -15,7 +15,7 @@ PD = "pd"
 CLASSICAL = (PD, "computed_torque", "computed_torque_posture")
 SPECIALISTS = ("ppo", "sac", "clone")
 """Policies of one circle."""
-TOLD_PLANNERS = tuple(name for name in PLANNERS if name.endswith("_payload"))
+ESTIMATORS = tuple(name for name in PLANNERS if name.endswith("_payload"))
 """Planners that estimate the payload, which policies of drawn tasks are told."""
 
 
@@ -37,8 +37,8 @@ class Contender:
 
     @property
     def slow(self) -> bool:
-        """Whether an episode takes it more than ten seconds of CPU time."""
-        return self.name in PLANNERS
+        """Whether it is one of `ESTIMATORS` that nobody has named: an episode takes it ten seconds of CPU time."""
+        return self.entry is not None and self.name in ESTIMATORS
 
     def player(self) -> Player:
         """The player.
@@ -59,7 +59,7 @@ def contenders(
     Args:
         counts: numbers of elbows on the table.
         guests: players of the user's own, WHAT or LABEL=WHAT, several with one label as its training seeds.
-        planners: whether `TOLD_PLANNERS` play.
+        planners: whether `ESTIMATORS` play.
         trust: whether files that may run code when they are read may be read.
 
     Raises:
@@ -84,7 +84,7 @@ def contenders(
 
 
 def _registered(elbows: int, planners: bool) -> list[Contender]:
-    names = (*CLASSICAL, *(TOLD_PLANNERS if planners else ()))
+    names = (*CLASSICAL, *(ESTIMATORS if planners else ()))
     policies = [Entry(name, elbows) for name in SPECIALISTS]
     policies += [entry for entry in learned() if (entry.elbows, entry.env) == (elbows, ENV)]
     found = [Contender(name, elbows, Entry(name, elbows)) for name in names]

@@ -68,12 +68,12 @@ def digest_of(elbows: int, task: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def file_of(tasks: TaskSet, folder: Path = RESULTS) -> Path:
+def file_of(drawn: TaskSet, folder: Path = RESULTS) -> Path:
     """File of a set's optima in a folder."""
-    return folder / f"{tasks.name}_optima.csv"
+    return folder / f"{drawn.name}_optima.csv"
 
 
-def read(path: Path, tasks: TaskSet = EVALUATION) -> dict[Key, Solved]:
+def read(path: Path, drawn: TaskSet = EVALUATION) -> dict[Key, Solved]:
     """The rows of a file, without those of other tasks than the set's; none where there is no file."""
     if not path.is_file():
         return {}
@@ -83,20 +83,20 @@ def read(path: Path, tasks: TaskSet = EVALUATION) -> dict[Key, Solved]:
             key = int(row["elbows"]), int(row["task"])
             values = {name: row[f"{name} [{unit}]"] for name, unit in UNITS.items()}
             figures = {name: float(value) for name, value in values.items() if value}
-            task = tasks.numbered(key[0]).get(key[1])
+            task = drawn.numbered(key[0]).get(key[1])
             if task is not None and row["digest"] == digest_of(key[0], task):
                 found[key] = Solved(row["digest"], row["status"], int(row["starts"]), figures)
     return found
 
 
-def optimal_figures(tasks: TaskSet = EVALUATION, path: Path | None = None) -> dict[Key, Mapping[str, float]]:
+def optimal_figures(drawn: TaskSet = EVALUATION, path: Path | None = None) -> dict[Key, Mapping[str, float]]:
     """Figures of the solved tasks of a set, from its own file when no other is given."""
-    known = read(file_of(tasks) if path is None else path, tasks)
+    known = read(file_of(drawn) if path is None else path, drawn)
     return {key: one.figures for key, one in known.items() if one.status == SOLVED}
 
 
 def solve(
-    counts: Sequence[int], starts: int, machines: Machines, tasks: TaskSet = EVALUATION, path: Path | None = None
+    counts: Sequence[int], starts: int, machines: Machines, drawn: TaskSet = EVALUATION, path: Path | None = None
 ) -> str:
     """Solves the tasks of a set that the file has no optimum of, and writes each as it is found.
 
@@ -106,7 +106,7 @@ def solve(
         counts: elbow counts, one after the other.
         starts: number of postures, as in `agents.optimal.bound`.
         machines: what solves them; their storage, where they have one, holds the store.
-        tasks: the set.
+        drawn: the set.
         path: file of the optima; the set's own when None.
 
     Returns:
@@ -119,12 +119,12 @@ def solve(
 
     if find_spec("casadi") is None:
         raise ValueError('casadi must be installed to solve, got none: pip install -e ".[optimal]"')
-    path = file_of(tasks) if path is None else path
+    path = file_of(drawn) if path is None else path
     check_writable(path.parent)
-    found = read(path, tasks)
-    asked = [(elbows, number) for elbows in counts for number in tasks.numbered(elbows)]
+    found = read(path, drawn)
+    asked = [(elbows, number) for elbows in counts for number in drawn.numbered(elbows)]
     todo = [key for key in asked if not _is_solved(found, key) or found[key].starts < starts]
-    options = {key: tasks.numbered(key[0])[key[1]] for key in todo}
+    options = {key: drawn.numbered(key[0])[key[1]] for key in todo}
 
     def keep(k: int, answer: Bound | str) -> None:
         key = todo[k]

@@ -69,7 +69,7 @@ def _interval(estimate: Estimate) -> str:
 
 
 def disturbed_table(found: Sequence[Score]) -> str:
-    """What each disturbance costs each player, in percent of the optimum's cost; empty where none was played.
+    """Cost of each disturbance to each player, in percent of the optimum's cost; empty where none was played.
 
     Players that played undisturbed alone are left out.
     """

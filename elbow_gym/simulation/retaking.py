@@ -24,7 +24,7 @@ FINER = (8, 64)
 BALANCE = 5e-4
 """Largest share of what is drawn and lost in a control period that may be missing [-]."""
 ROUNDING = 1e-12
-"""What rounding may add to that, as a share of the energy stored [-]."""
+"""Largest addition of rounding to that, as a share of the energy stored [-]."""
 GONE = 10.0
 """Turnover, as a multiple of the energy of its motion at the start, after which an arm moves as its motors make it."""
 ALWAYS = 1e300

@@ -47,7 +47,7 @@ def test_an_info_and_the_evaluation_tasks_set_a_task_again_bit_for_bit(elbows):
         assert same(again[:2], drawn[:2])
         for name in ("circle", "start"):
             assert same(dict(again[2][name]), dict(drawn[2][name]))
-    assert evaluation_tasks(elbows, [5, EVALUATION_SEEDS[k]])[1] == evaluation_tasks(elbows)[k]
+    assert evaluation_tasks(elbows, np.array([5, EVALUATION_SEEDS[k]]))[1] == evaluation_tasks(elbows)[k]
     assert not same(played(env, seed=3)[0], drawn[0])
 
 

@@ -30,7 +30,7 @@ class Spread(NamedTuple):
     inverse: Tensor
     """Inverses of the standard deviations [-], shape (n,)."""
     constant: Tensor
-    """What the log-probability of the mean action is below zero [-], shape ()."""
+    """Log-probability of the mean action, negated [-], shape ()."""
 
     @classmethod
     def of(cls, log_std: Tensor) -> Spread:

@@ -74,7 +74,7 @@ TROUBLES = {
     ),
     "forbidden": ("os.geteuid() or os.seteuid(65534)", "Permission denied"),
 }
-"""What goes wrong in the middle, and how the sentence on it begins."""
+"""Faults in the middle of a training, and how the sentence on each begins."""
 
 
 @pytest.fixture

@@ -116,6 +116,8 @@ def test_everybody_plays_with_all_training_seeds_and_policies_where_their_elbows
     assert not any(one.slow for one in found)
     slow = [one.name for one in contenders([1], planners=True) if one.slow]
     assert slow == ["receding_horizon_payload", "sampling_mpc_payload"]
+    # Whoever names one wants all that it is asked for.
+    assert not contenders([1], ["sampling_mpc_payload"])[-1].slow
     for name in ("ppo", "sac", "clone"):
         assert [one.seed for one in found if (one.name, one.elbows) == (name, 2)] == [0, 1, 2, 3, 4]
     path = "elbow_gym/baselines/policies/ppo_elbows1_seed3"
