@@ -1,4 +1,4 @@
-"""Number of threads that torch takes."""
+"""Number of threads that torch and BLAS take."""
 
 from __future__ import annotations
 
@@ -8,12 +8,17 @@ from contextlib import contextmanager
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """One thread for torch inside: small networks lose more by handing work between threads than they gain."""
+    """One thread for torch and BLAS inside: small networks lose more by handing work to threads than they gain.
+
+    On more threads BLAS would also add up in another order.
+    """
     import torch
+    from threadpoolctl import threadpool_limits
 
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        yield
+        with threadpool_limits(1, user_api="blas"):
+            yield
     finally:
         torch.set_num_threads(threads)

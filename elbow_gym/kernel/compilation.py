@@ -61,7 +61,8 @@ def remembered(context: Any) -> Generator[None]:
     search = context.resolve_function_type
 
     def resolve(function: Any, args: Any, kws: Any) -> Any:
-        if kws or isinstance(function, types.Dispatcher):
+        # Numba's own words ask about constant indices, whose slices have no hash before Python 3.12.
+        if kws or isinstance(function, types.Dispatcher | str):
             return search(function, args, kws)
         found = _answers.get((function, args))
         if found is None:

@@ -68,3 +68,13 @@ def test_state_goes_on_bit_for_bit_and_fits_its_own_size_alone():
     assert torch.equal(after.values, whole.values)
     with pytest.raises(ValueError, match="state must be of 48 parameters, got 80"):
         FlatAdam(parameters()[:2], lr=0.1).load_state_dict(whole.state_dict())
+
+
+def test_places_are_those_of_its_own_parameters():
+    parts = parameters()
+    optimizer = FlatAdam(parts, lr=0.1)
+    for part in parts:
+        first = optimizer.place(part)
+        assert torch.equal(optimizer.values[first : first + part.numel()].view_as(part), part)
+    with pytest.raises(ValueError, match=r"parameter must be one of the optimizer's, got one of shape \(17,\)"):
+        optimizer.place(parameters()[1])

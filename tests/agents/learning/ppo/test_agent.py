@@ -34,6 +34,15 @@ def vector(model):
     return torch.nn.utils.parameters_to_vector(model.policy.parameters()).detach().clone()
 
 
+def fill(buffer):
+    rng = np.random.default_rng(0)
+    for name in ("observations", "actions", "advantages", "returns"):
+        array = getattr(buffer, name)
+        array[:] = 0.3 * rng.normal(size=array.shape)
+    buffer.full = True
+    return rng
+
+
 @pytest.mark.parametrize(
     ("activation", "arguments"),
     [
@@ -49,11 +58,8 @@ def test_update_is_that_of_stable_baselines3(env, activation, arguments):
     torch.testing.assert_close(vector(own), vector(theirs), rtol=0.0, atol=0.0)
     before = vector(own)
     for model in (own, theirs):
-        buffer, rng = model.rollout_buffer, np.random.default_rng(0)
-        for name in ("observations", "actions", "advantages", "returns"):
-            array = getattr(buffer, name)
-            array[:] = 0.3 * rng.normal(size=array.shape)
-        buffer.full = True
+        buffer = model.rollout_buffer
+        rng = fill(buffer)
         with torch.no_grad():
             flat = (torch.from_numpy(part).flatten(0, 1) for part in (buffer.observations, buffer.actions))
             log_probs = model.policy.evaluate_actions(*flat)[1].view(STEPS, ARMS)
@@ -65,6 +71,15 @@ def test_update_is_that_of_stable_baselines3(env, activation, arguments):
         model.train()
     assert (vector(own) - before).abs().max() > 0.02
     torch.testing.assert_close(vector(own), vector(theirs), rtol=1e-4, atol=1e-5)
+
+
+def test_deviations_that_are_not_learned_stay(env):
+    model = small(PPO, env)
+    fill(model.rollout_buffer)
+    before, log_std = vector(model), model.policy.log_std.requires_grad_(False)
+    model.train()
+    assert torch.equal(log_std, torch.full_like(log_std, -1.0))
+    assert not torch.equal(vector(model), before)
 
 
 def test_rollout_holds_what_stable_baselines3_would_have_stored(env):
