@@ -62,7 +62,7 @@ def room_for(*networks: Integers) -> Room:
 
 @compiled
 def _exponential(x: float) -> tuple[float, float]:
-    """Odd and even part of the polynomial p of Pade's e^x = p(x) / p(-x), to single precision; x up to `_LARGE`."""
+    """Odd and even part of Pade's polynomial p, with e^x = p(x) / p(-x) to single precision up to `_LARGE`."""
     x = min(max(x, -_LARGE), _LARGE)
     s = x * x
     odd = x * (_C1 + s * (_C3 + s * (_C5 + s * (_C7 + s * (_C9 + s * _C11)))))
@@ -78,7 +78,7 @@ def _activate(value: Array, slope: Array, bias: Array, kind: int) -> None:
             for i in range(width):
                 x = value[r, i] + bias[i]
                 odd, even = _exponential(x)
-                share = _HALF + _HALF * odd / even
+                share = _HALF + _HALF * odd / even if x > -_LARGE else _ZERO
                 value[r, i], slope[r, i] = x * share, share * (_ONE + x * (_ONE - share))
         elif kind == TANH:
             for i in range(width):
