@@ -191,7 +191,8 @@ def tasks(
         players: Player of your own, as `python -m agents evaluate --help` says, for a row beside the others; may be
             given several times, with one LABEL= for the training seeds of one.
         trust: Whether to read a .zip, whose pickles can run any code when they are read.
-        publish: Whether to write the results to benchmarks/results and the evaluation tasks' table into the README.
+        publish: Whether to write the results to benchmarks/results, and those of the evaluation tasks into the README;
+            these need --planners and --disturb.
         machines: Machines.
     """
     from benchmarks.tasks.task_set import EVALUATION, TaskSet

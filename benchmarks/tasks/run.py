@@ -10,6 +10,7 @@ from pathlib import Path
 from agents.files import write_csv, write_text, write_whole
 from agents.jobs.job import Job
 from agents.jobs.machines import Machines, do_all
+from agents.style import ELBOW_NAMES
 from agents.workers import compile_before
 from benchmarks.blocks import publish_blocks
 from benchmarks.machine import CACHE, RESULTS
@@ -50,8 +51,11 @@ def tasks(
         folder: folder of what was played before.
 
     Raises:
-        ValueError: no task is solved, or a player of the user's own plays at none of the elbow counts.
+        ValueError: no task is solved, a player of the user's own plays at none of the elbow counts, or a part of the
+            evaluation, or more than it, is to be published.
     """
+    if publish and drawn == EVALUATION:
+        _check_whole(elbows, guests, planners, disturb)
     known = {key: figures for key, figures in optimal_figures(drawn, optima).items() if key[0] in elbows}
     if not known:
         path = optima or file_of(drawn)
@@ -74,6 +78,15 @@ def tasks(
     if publish:
         publish_blocks(output)
     return "\n".join(text for text in texts.values() if text)
+
+
+def _check_whole(elbows: Sequence[int], guests: Sequence[str], planners: bool, disturb: bool) -> None:
+    """Raises ValueError unless this is what the README's tables show."""
+    if not (planners and disturb and not guests and set(elbows) == set(ELBOW_NAMES)):
+        given = f"elbows {list(elbows)}, planners {planners}, disturb {disturb}, players {list(guests)}"
+        raise ValueError(
+            f"--publish must be given with --planners and --disturb and without --with and --elbows, got {given}"
+        )
 
 
 def _episodes(

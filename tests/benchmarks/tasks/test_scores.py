@@ -135,3 +135,14 @@ def test_comparison_needs_an_optimum_and_writes_what_it_says(episodes, tmp_path,
     tasks(tmp_path, [2], drawn=TaskSet(7))
     assert (tmp_path / "tasks_7.md").read_text() == (tmp_path / "tasks.md").read_text()
     assert (tmp_path / "tasks_7.csv").is_file()
+
+
+@pytest.mark.parametrize(
+    "part",
+    [{"planners": False}, {"disturb": False}, {"elbows": [2, 1]}, {"guests": ["ppo"]}],
+    ids=lambda part: next(iter(part)),
+)
+def test_the_evaluation_is_published_as_a_whole(tmp_path, part):
+    whole = {"elbows": [2, 1, 0], "planners": True, "disturb": True}
+    with pytest.raises(ValueError, match=r"^--publish must be given with --planners and --disturb and without --with"):
+        tasks(tmp_path, **{**whole, **part}, publish=True)
