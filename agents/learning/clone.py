@@ -55,6 +55,8 @@ def clone(
     """
     import torch
 
+    from agents.learning.fit import Fit
+
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     env = ElbowArmVectorEnv(how.num_envs, **settings.arguments, autoreset_mode="Disabled")
@@ -62,7 +64,7 @@ def clone(
     observation, _ = env.reset(seed=rng.integers(2**31, size=how.num_envs).tolist())
     sizes = (observation.shape[1], *how.hidden, env.action_space.shape[1])
     network = _network(sizes)
-    optimiser = torch.optim.Adam(network.parameters(), fused=True)
+    fit = Fit(network)
     seen: list[NDArray[np.float32]] = []
     labels: list[NDArray[np.float32]] = []
     policy = _policy(network, sizes, settings, env, card)
@@ -79,17 +81,11 @@ def clone(
             labels.append(label)
             action = np.where(taught[:, None], label, own) + shaken[:, None] * rng.standard_normal(label.shape)
             observation, *_ = env.step(np.clip(action, -1.0, 1.0).astype(np.float32))
-        x, y = torch.from_numpy(np.concatenate(seen)), torch.from_numpy(np.concatenate(labels))
+        x, y = np.concatenate(seen), np.concatenate(labels)
         for j in range(how.gradient_steps):
             done = (k + j / how.gradient_steps) / how.rounds
             rate = how.learning_rate * max(LOWEST_RATE, 0.5 * (1.0 + np.cos(np.pi * done)))
-            for group in optimiser.param_groups:
-                group["lr"] = rate
-            chosen = torch.from_numpy(rng.integers(len(x), size=how.batch_size))
-            loss = ((network(x[chosen]) - y[chosen]) ** 2).mean()
-            optimiser.zero_grad()
-            loss.backward()
-            optimiser.step()
+            fit.step(rng.integers(len(x), size=how.batch_size), x, y, rate)
         policy = _policy(network, sizes, settings, env, card)
         after_round((k + 1) * settings.horizon * how.num_envs, policy)
     return policy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -106,16 +107,18 @@ def imitate(model: Any, shown: Demonstrations, steps: int, seed: int, batch_size
     """
     import torch
 
+    from agents.learning.fit import Fit
+
     rng = np.random.default_rng(seed)
-    seen, done = (torch.from_numpy(part.reshape(-1, part.shape[-1])) for part in shown)
-    actor = torch.nn.Sequential(*actor_layers(model), torch.nn.Tanh())
-    optimiser = torch.optim.Adam(actor.parameters(), fused=True)
+    seen, done = (part.reshape(-1, part.shape[-1]) for part in shown)
+    # The actor's own parameters keep their places in the memory of its optimizer.
+    actor = actor_layers(model)
+    copied = copy.deepcopy(actor)
+    fit = Fit(copied, squashed=True)
     for k in range(steps):
-        for group in optimiser.param_groups:
-            group["lr"] = 2e-3 * (1.0 - k / steps)
-        chosen = torch.from_numpy(rng.integers(len(seen), size=batch_size))
-        loss = (actor(seen[chosen]) - done[chosen]).square().sum(-1).mean()
-        optimiser.zero_grad()
-        loss.backward()
-        optimiser.step()
+        fit.step(rng.integers(len(seen), size=batch_size), seen, done, 2e-3 * (1.0 - k / steps))
+    with torch.no_grad():
+        for layer, other in zip(actor, copied, strict=True):
+            for own, fitted in zip(layer.parameters(), other.parameters(), strict=True):
+                own.copy_(fitted)
     model.policy.follow(1.0, 1.0)

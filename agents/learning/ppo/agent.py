@@ -13,9 +13,9 @@ from stable_baselines3.common.utils import explained_variance
 
 from agents.learning.actor import actor_layers
 from agents.learning.flat_adam import FlatAdam
+from agents.learning.layers import kind_of, outputs, places_of
+from agents.learning.passes import Array, Integers, room_for
 from agents.learning.ppo.gradient import Loss, Networks, Samples, gradient_of
-from agents.learning.ppo.layers import kind_of, outputs, places_of
-from agents.learning.ppo.passes import Array, Integers, room_for
 
 
 class PPO(stable_baselines3.PPO):

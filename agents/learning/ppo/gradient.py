@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.learning.compiled import compiled, entry
-from agents.learning.ppo.passes import ROWS, Array, Integers, Room, backward, forward, transpose
+from agents.learning.passes import ROWS, Array, Integers, Room, backward, forward, transpose
 
 _ZERO, _HALF, _ONE = (np.float32(x) for x in (0.0, 0.5, 1.0))
 _LOG_ROOT = np.float32(0.5 * math.log(2.0 * math.pi))

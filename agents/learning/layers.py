@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from torch import Tensor, nn
 
-from agents.learning.ppo.passes import ELU, RELU, SILU, TANH, Array, Integers, Room, outputs_of
+from agents.learning.passes import ELU, RELU, SILU, TANH, Array, Integers, Room, outputs_of
 
 KINDS: dict[type[nn.Module], int] = {nn.SiLU: SILU, nn.Tanh: TANH, nn.ReLU: RELU, nn.ELU: ELU}
 """Functions after hidden layers by torch's modules with their default arguments."""
