@@ -61,10 +61,12 @@ def remembered(context: Any) -> Generator[None]:
     search = context.resolve_function_type
 
     def resolve(function: Any, args: Any, kws: Any) -> Any:
-        # Numba's own words ask about constant indices, whose slices have no hash before Python 3.12.
-        if kws or isinstance(function, types.Dispatcher | str):
+        if kws or isinstance(function, types.Dispatcher):
             return search(function, args, kws)
-        found = _answers.get((function, args))
+        try:
+            found = _answers.get((function, args))
+        except TypeError:  # A constant slice has no hash before Python 3.12.
+            return search(function, args, kws)
         if found is None:
             found = _answers[function, args] = search(function, args, kws)
         return found

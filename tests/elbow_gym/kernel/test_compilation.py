@@ -31,9 +31,12 @@ def test_an_answer_is_searched_for_once_and_none_is_no_answer(monkeypatch):
         assert context.searches == 3
         assert context.resolve_function_type("+", (1,), {"x": 2}) == ("+", 1, "x")
         assert context.resolve_function_type("+", (1,), {}) == ("+", 1)
+        for _ in range(2):
+            assert context.resolve_function_type("index", (1, [2]), {}) == ("index", 1, [2])
+        assert context.searches == 7
     for _ in range(2):
         context.resolve_function_type("+", (1, 2), {})
-    assert context.searches == 7
+    assert context.searches == 9
 
 
 @compilation.compiling(Context())
