@@ -16,6 +16,7 @@ BLOCKS = {
         "learning": "learning.md",
         "builds": "builds.md",
         "tasks": "tasks.md",
+        "disturbed": "tasks_disturbed.md",
         "speed": "speed_brief.md",
         "precision": "precision.md",
     },

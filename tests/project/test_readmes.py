@@ -195,6 +195,19 @@ def test_gaps_on_tasks_of_other_seeds_are_told_as_they_were_played():
     assert {(row["tasks [-]"], row["failures [-]"]) for row in table.values()} == {("50", "0")}
 
 
+def test_gaps_of_the_planner_and_losses_by_an_untold_load_are_told_as_they_were_played():
+    text = " ".join(prose("benchmarks/README.md").split())
+    (gaps,) = re.findall(r"with median gaps of ([\d.]+), ([\d.]+) and ([\d.]+) %", text)
+    for figure, gap in zip(gaps, off_tasks("receding_horizon_payload"), strict=True):
+        assert float(figure) == pytest.approx(gap, abs=0.0501)
+    (losses,) = re.findall(
+        r"is not told costs the policies of drawn tasks (\d+) % .*? and computed torque (\d+) %", text
+    )
+    table = {row["controller"]: row for row in rows(RESULTS / "tasks.csv") if row["elbows"] == "2"}
+    for figure, who in zip(losses, ("newton_tasks", "computed_torque"), strict=True):
+        assert float(figure) == round(100.0 * float(table[who]["loss_payload [-]"]))
+
+
 def test_prose_of_the_readme_has_at_most_a_dozen_figures_and_all_are_compared():
     figures = re.findall(r"(?<![\w.])\d[\d.,]*", prose("README.md"))
     assert len(figures) == sum(claim.count("{}") for claim in CLAIMS) <= 12
