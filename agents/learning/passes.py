@@ -105,9 +105,11 @@ def transpose(parameters: Array, places: Integers, room: Room) -> None:
     """Puts a network's weights with the inputs first into the room, for the passes until they change."""
     for k in range(len(places)):
         weight, _, inputs, outputs = places[k]
+        weights = parameters[weight : weight + inputs * outputs].reshape(outputs, inputs)
+        other = room.transposed[weight : weight + inputs * outputs].reshape(inputs, outputs)
         for i in range(inputs):
             for j in range(outputs):
-                room.transposed[weight + i * outputs + j] = parameters[weight + j * inputs + i]
+                other[i, j] = weights[j, i]
 
 
 @compiled
@@ -155,9 +157,10 @@ def backward(x: Array, parameters: Array, places: Integers, room: Room, gradient
                 back[r, i] *= slope[r, i]
                 of_bias[i] += back[r, i]
         before = x if k == 0 else room.value[first - rows * inputs : first].reshape(rows, inputs)
-        np.dot(back.T, before, room.product[:size].reshape(outputs, inputs))
+        product, of_weights = room.product[:size], gradient[weight : weight + size]
+        np.dot(back.T, before, product.reshape(outputs, inputs))
         for i in range(size):
-            gradient[weight + i] += room.product[i]
+            of_weights[i] += product[i]
         if k > 0:
             weights = parameters[weight : weight + size].reshape(outputs, inputs)
             np.dot(back, weights, room.back[1 - now, : rows * inputs].reshape(rows, inputs))
