@@ -62,12 +62,12 @@ def running() -> dict[str, str]:
 
 
 def check_versions(checkpoint: Checkpoint) -> None:
-    """Raises ValueError naming both versions where a checkpoint was saved by others than run now."""
+    """Raises ValueError naming both versions where a checkpoint was saved by others than run now, as far as it says."""
     before, now = checkpoint.progress().get("versions", {}), running()
     for name, version in now.items():
-        if before.get(name) != version:
+        if before.get(name, version) != version:
             raise ValueError(
-                f"{name} of a resumed run must be {before.get(name)} as when {checkpoint.path} was saved, got {version}"
+                f"{name} of a resumed run must be {before[name]} as when {checkpoint.path} was saved, got {version}"
             )
 
 

@@ -13,6 +13,13 @@ KINDS: dict[type[nn.Module], int] = {nn.SiLU: SILU, nn.Tanh: TANH, nn.ReLU: RELU
 """Functions after hidden layers by torch's modules with their default arguments."""
 
 
+def compilable(modules: Sequence[nn.Module]) -> bool:
+    """Whether networks are of layers that the passes know, with one kind of function in between, and all learn."""
+    kinds = {type(module) for module in modules} - {nn.Linear}
+    learns = all(part.requires_grad for module in modules for part in module.parameters())
+    return learns and kinds <= set(KINDS) and len(kinds) <= 1
+
+
 def places_of(modules: Sequence[nn.Module], place: Callable[[Tensor], int]) -> Integers:
     """A network's places: for each layer the positions of weights and biases, and the numbers of inputs and outputs.
 
@@ -25,7 +32,7 @@ def places_of(modules: Sequence[nn.Module], place: Callable[[Tensor], int]) -> I
 
 
 def kind_of(modules: Sequence[nn.Module]) -> int:
-    """Function after the hidden layers of a network; SILU where it has none."""
+    """Function after the hidden layers of networks; SILU where they have none."""
     return next((KINDS[type(module)] for module in modules if not isinstance(module, nn.Linear)), SILU)
 
 

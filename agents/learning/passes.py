@@ -55,7 +55,7 @@ def room_for(*networks: Integers) -> Room:
         max(int((places[:, 2] * places[:, 3]).max()) for places in networks),
         max(int(places[:, 0].max() + (places[:, 2] * places[:, 3]).max()) for places in networks),
     )
-    x = np.empty((ROWS, int(networks[0][0, 2])), np.float32)
+    x = np.empty((ROWS, max(int(places[0, 2]) for places in networks)), np.float32)
     values, product, transposed = (np.empty(size, np.float32) for size in sizes)
     return Room(x, values, np.empty_like(values), np.empty((2, ROWS * widest), np.float32), product, transposed)
 

@@ -14,8 +14,8 @@ from agents.learning.run_folder import RunFolder
 from agents.learning.settings import AlgorithmSettings
 from agents.workers import cores
 
-PACKAGES = ("elbow-gym", "stable-baselines3", "torch", "gymnasium", "numpy", "numba")
-"""Packages that a training's outcome depends on."""
+PACKAGES = ("elbow-gym", "stable-baselines3", "torch", "gymnasium", "numpy", "numba", "scipy")
+"""Packages that a training's outcome depends on; compiled products of matrices are SciPy's."""
 
 
 @dataclass(frozen=True, kw_only=True)

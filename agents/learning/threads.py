@@ -12,6 +12,8 @@ def one_thread() -> Iterator[None]:
 
     On more threads BLAS would also add up in another order.
     """
+    # Loaded here, since the limit reaches nothing that is loaded later; compiled products of matrices are this BLAS's.
+    import scipy.linalg  # noqa: F401  # pyright: ignore[reportUnusedImport]
     import torch
     from threadpoolctl import threadpool_limits
 

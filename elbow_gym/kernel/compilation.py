@@ -29,7 +29,7 @@ def compiling(context: Any) -> Generator[None]:
 @contextmanager
 def announced() -> Generator[None]:
     """Says so when what is called inside takes a while."""
-    message = "elbow_gym: compiling its kernel for this machine, once; later starts take it from the cache"
+    message = "elbow_gym: compiling for this machine, once; later starts take it from the cache"
     notice = Timer(PATIENCE, print, (message,), {"file": sys.stderr, "flush": True})
     notice.daemon = True
     notice.start()

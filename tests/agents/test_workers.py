@@ -20,7 +20,7 @@ def made(monkeypatch):
     class Slow:
         def __init__(self, arms, **arguments):
             found.append((arms, arguments["elbows"], arguments["table"]))
-            print("elbow_gym: compiling its kernel for this machine, once", file=sys.stderr, flush=True)
+            print("elbow_gym: compiling for this machine, once", file=sys.stderr, flush=True)
             time.sleep(0.05)
 
         def reset(self, seed):

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 import stable_baselines3
 import torch
+from gymnasium.spaces import Box
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.common.utils import explained_variance
 
 from agents.learning.actor import actor_layers
 from agents.learning.flat_adam import FlatAdam
-from agents.learning.layers import kind_of, outputs, places_of
+from agents.learning.layers import compilable, kind_of, outputs, places_of
 from agents.learning.passes import Array, Integers, room_for
 from agents.learning.ppo.gradient import Loss, Networks, Samples, gradient_of
 
@@ -23,10 +26,12 @@ class PPO(stable_baselines3.PPO):
 
     The algorithm, its settings and what it saves are the parent's. The networks and the loss are compiled, with the
     gradient written down instead of recorded; the noise of a rollout is drawn at once, and the values of its
-    observations are computed at once after it. State-dependent noise and other optimizers than `FlatAdam` are left to
-    the parent. One thread of BLAS is fastest, and has the same bits everywhere.
+    observations are computed at once after it. Everything that this does not cover is left to the parent: other
+    optimizers than `FlatAdam`, policies than `MlpPolicy` with one of four activations, spaces than one row of numbers,
+    state-dependent noise, layers that do not learn, and a limit on the values' change.
 
-    Takes the arguments of `stable_baselines3.PPO`; a limit on the values' change (`clip_range_vf`) is not among them.
+    Takes the arguments of `stable_baselines3.PPO`. Learn inside `one_thread`: that is fastest, and the number of BLAS's
+    threads changes the bits.
     """
 
     policy: Any
@@ -34,7 +39,17 @@ class PPO(stable_baselines3.PPO):
 
     @property
     def _written_down(self) -> bool:
-        return isinstance(self.policy.optimizer, FlatAdam) and not self.use_sde
+        policy = self.policy
+        if self.use_sde or self.clip_range_vf is not None or type(policy) is not ActorCriticPolicy:
+            return False
+        plain = isinstance(policy.optimizer, FlatAdam) and type(policy.features_extractor) is FlattenExtractor
+        spaces = isinstance(self.action_space, Box) and len(self.observation_space.shape or ()) == 1
+        return plain and spaces and compilable(self._layers)
+
+    @property
+    def _layers(self) -> list[Any]:
+        """Layers of the actor and then of the critic."""
+        return [*actor_layers(self), *self.policy.mlp_extractor.value_net, self.policy.value_net]
 
     def collect_rollouts(self, env: Any, callback: Any, rollout_buffer: Any, n_rollout_steps: int) -> bool:
         """Fills the buffer with control periods of all arms; False where the callback ended the training.
@@ -73,7 +88,7 @@ class PPO(stable_baselines3.PPO):
             if not callback.on_step():
                 return False
             over = np.flatnonzero(dones)
-            self._update_info_buffer([infos[i] for i in over])
+            self._update_info_buffer([infos[i] for i in over], np.ones(len(over), dtype=bool))
             for i in over:
                 if infos[i].get("TimeLimit.truncated", False):
                     ended.append((k, i))
@@ -106,6 +121,7 @@ class PPO(stable_baselines3.PPO):
         figures: list[Array] = []
         diverged = False
         for epoch in range(self.n_epochs):
+            figures.clear()
             for batch in self._batches():
                 means = np.empty(4)
                 gradient_of(batch, samples, parameters, networks, loss, room, gradient, means)
@@ -127,9 +143,10 @@ class PPO(stable_baselines3.PPO):
 
     def _networks(self) -> Networks:
         """Where actor, whose outputs are the means of the actions, critic and deviations lie in the parameters."""
-        actor, critic = actor_layers(self), [*self.policy.mlp_extractor.value_net, self.policy.value_net]
-        place = self.policy.optimizer.place
-        return Networks(places_of(actor, place), places_of(critic, place), kind_of(actor), place(self.policy.log_std))
+        policy, place = self.policy, self.policy.optimizer.place
+        both, actor = self._layers, actor_layers(self)
+        critic = both[len(actor) :]
+        return Networks(places_of(actor, place), places_of(critic, place), kind_of(both), place(policy.log_std))
 
     def _samples(self) -> Samples:
         """The rollout buffer, arm after arm of each control period."""

@@ -111,7 +111,8 @@ def _surrogate(
         ratio = math.exp(log_ratio)
         advantage = (samples.advantage[sample] - normal[0]) * normal[1]
         free, held = advantage * ratio, advantage * min(max(ratio, _ONE - clip), _ONE + clip)
-        slope = -free if free <= held else _ZERO
+        # NaN is less than nothing: it has to reach the actor, which would stand still without a word.
+        slope = _ZERO if free > held else -free
         for j in range(len(log_std)):
             departure = back[r, j]
             back[r, j] = departure * slope * inverse[j]

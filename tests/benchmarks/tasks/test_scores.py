@@ -9,7 +9,7 @@ from benchmarks.tasks import run as module
 from benchmarks.tasks.contenders import Contender
 from benchmarks.tasks.episodes import DISTURBANCES, NOMINAL, UNITS
 from benchmarks.tasks.report import disturbed_table, figure, table, write_scores
-from benchmarks.tasks.run import tasks
+from benchmarks.tasks.run import _check_whole, tasks
 from benchmarks.tasks.scores import scores
 from benchmarks.tasks.task_set import TaskSet
 
@@ -146,3 +146,7 @@ def test_the_evaluation_is_published_as_a_whole(tmp_path, part):
     whole = {"elbows": [2, 1, 0], "planners": True, "disturb": True}
     with pytest.raises(ValueError, match=r"^--publish must be given with --planners and --disturb and without --with"):
         tasks(tmp_path, **{**whole, **part}, publish=True)
+
+
+def test_a_whole_evaluation_is_published():
+    _check_whole([0, 1, 2], [], planners=True, disturb=True)

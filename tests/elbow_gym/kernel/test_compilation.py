@@ -63,7 +63,7 @@ def test_a_long_compilation_is_told_and_a_short_one_is_not(monkeypatch, capsys):
     monkeypatch.setattr(compilation, "PATIENCE", 0.0)
     with compilation.announced():
         time.sleep(0.2)
-    assert capsys.readouterr().err.startswith("elbow_gym: compiling its kernel for this machine")
+    assert capsys.readouterr().err.startswith("elbow_gym: compiling for this machine, once")
 
 
 def test_resets_and_steps_of_a_compiled_kernel_announce_nothing(monkeypatch):
