@@ -11,7 +11,7 @@ from torch import nn
 from agents.learning.compiled import entry
 from agents.learning.flat_adam import FlatAdam
 from agents.learning.layers import kind_of, places_of
-from agents.learning.passes import ROWS, Array, Integers, Room, backward, forward, room_for, transpose
+from agents.learning.passes import ROWS, Array, Integers, Room, backward, forward, gather, room_for, transpose
 
 
 @entry
@@ -44,10 +44,7 @@ def _gradient(
     transpose(parameters, places, room)
     for begin in range(0, len(batch), ROWS):
         block = batch[begin : begin + ROWS]
-        x = room.x[: len(block)]
-        for r in range(len(block)):
-            for i in range(x.shape[1]):
-                x[r, i] = inputs[block[r], i]
+        x = gather(inputs, block, room)
         found = forward(x, parameters, places, kind, room)
         back = room.back[0, : found.size].reshape(found.shape)
         for r in range(len(block)):

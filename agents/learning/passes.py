@@ -113,6 +113,16 @@ def transpose(parameters: Array, places: Integers, room: Room) -> None:
 
 
 @compiled
+def gather(inputs: Array, block: Integers, room: Room) -> Array:
+    """Inputs of a block's samples by their numbers, shape (rows, inputs), in the room."""
+    x = room.x[: len(block)]
+    for r in range(len(block)):
+        for i in range(x.shape[1]):
+            x[r, i] = inputs[block[r], i]
+    return x
+
+
+@compiled
 def forward(x: Array, parameters: Array, places: Integers, kind: int, room: Room) -> Array:
     """Outputs of a block, shape (rows, outputs); the room holds the values and slopes of all layers then.
 

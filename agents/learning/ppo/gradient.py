@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.learning.compiled import compiled, entry
-from agents.learning.passes import ROWS, Array, Integers, Room, backward, forward, transpose
+from agents.learning.passes import ROWS, Array, Integers, Room, backward, forward, gather, transpose
 
 _ZERO, _HALF, _ONE = (np.float32(x) for x in (0.0, 0.5, 1.0))
 _LOG_ROOT = np.float32(0.5 * math.log(2.0 * math.pi))
@@ -155,10 +155,7 @@ def gradient_of(
     transpose(parameters, networks.critic, room)
     for begin in range(0, len(batch), ROWS):
         block = batch[begin : begin + ROWS]
-        x = room.x[: len(block)]
-        for r in range(len(block)):
-            for i in range(x.shape[1]):
-                x[r, i] = samples.observation[block[r], i]
+        x = gather(samples.observation, block, room)
         mean = forward(x, parameters, networks.actor, networks.kind, room)
         back = room.back[0, : mean.size].reshape(mean.shape)
         _surrogate(mean, block, samples, log_std, inverse, loss.clip_range, normal, back, of_log_std, figures)
