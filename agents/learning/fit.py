@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from torch import nn
 
 from agents.learning.compiled import entry
-from agents.learning.flat_adam import FlatAdam
-from agents.learning.layers import kind_of, places_of
-from agents.learning.passes import ROWS, Array, Integers, Room, backward, forward, gather, room_for, transpose
+from agents.learning.passes import ROWS, SILU, Array, Integers, Room, backward, forward, gather, room_for, transpose
+
+if TYPE_CHECKING:
+    from torch import nn
 
 
 @entry
@@ -66,6 +67,9 @@ class Fit:
     """
 
     def __init__(self, layers: Sequence[nn.Module], squashed: bool = False) -> None:
+        from agents.learning.flat_adam import FlatAdam
+        from agents.learning.layers import kind_of, places_of
+
         self._optimizer = FlatAdam((part for layer in layers for part in layer.parameters()), lr=0.0)
         self._places, self._kind, self._squashed = places_of(layers, self._optimizer.place), kind_of(layers), squashed
         self._room = room_for(self._places)
@@ -84,3 +88,10 @@ class Fit:
         _gradient(batch, inputs, targets, self._squashed, *arrays)
         optimizer.param_groups[0]["lr"] = rate
         optimizer.step()
+
+
+def compile_fit() -> None:
+    """Compiles what a fit calls, where it is not on disk, by a network of one input and output."""
+    places, (parameters, gradient) = np.array([(0, 16, 1, 1)]), np.zeros((2, 32), np.float32)
+    one = np.ones((1, 1), np.float32)
+    _gradient(np.zeros(1, np.int64), one, one, False, parameters, places, SILU, room_for(places), gradient)

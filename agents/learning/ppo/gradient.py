@@ -9,7 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.learning.compiled import compiled, entry
-from agents.learning.passes import ROWS, Array, Integers, Room, backward, forward, gather, transpose
+from agents.learning.passes import (
+    ROWS,
+    SILU,
+    Array,
+    Integers,
+    Room,
+    backward,
+    forward,
+    gather,
+    outputs_of,
+    room_for,
+    transpose,
+)
 
 _ZERO, _HALF, _ONE = (np.float32(x) for x in (0.0, 0.5, 1.0))
 _LOG_ROOT = np.float32(0.5 * math.log(2.0 * math.pi))
@@ -170,3 +182,14 @@ def gradient_of(
         gradient[i] *= share
     for i in range(len(figures)):
         figures[i] *= share
+
+
+def compile_loops() -> None:
+    """Compiles what rollouts and updates call, where it is not on disk, by networks of one input and output."""
+    actor, critic = (np.array([(place, place + 16, 1, 1)]) for place in (16, 48))
+    networks, room = Networks(actor, critic, SILU, 0), room_for(actor, critic)
+    parameters, gradient = np.zeros((2, 80), np.float32)
+    one = np.ones((1, 1), np.float32)
+    outputs_of(one, parameters, actor, SILU, room, one.copy())
+    samples, loss = Samples(one, one, *one.repeat(3, axis=0)), Loss(clip_range=0.2, vf_coef=0.5, normalize=True)
+    gradient_of(np.zeros(1, np.int64), samples, parameters, networks, loss, room, gradient, np.empty(4))

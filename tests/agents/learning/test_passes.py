@@ -1,6 +1,8 @@
 """Compiled networks: what torch computes and records, up to rounding."""
 
 import copy
+import subprocess
+import sys
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +13,7 @@ pytest.importorskip("torch")
 import torch
 from torch import nn
 
-from agents.learning.fit import Fit
+from agents.learning.fit import Fit, _gradient, compile_fit
 from agents.learning.flat_adam import FlatAdam
 from agents.learning.layers import KINDS, kind_of, outputs, places_of
 from agents.learning.passes import ROWS, room_for
@@ -68,3 +70,16 @@ def test_steps_of_a_fit_are_those_of_torch(activation, squashed):
         adam.step()
     for one, other in zip(own.parameters(), reference.parameters(), strict=True):
         torch.testing.assert_close(one, other, rtol=1e-4, atol=1e-5)
+
+
+def test_a_fit_compiles_nothing_after_its_loops():
+    compile_fit()
+    before = list(_gradient.signatures)
+    Fit(network(nn.Tanh, 3, 2)).step(np.arange(4), np.ones((4, 3), np.float32), np.ones((4, 2), np.float32), 0.1)
+    assert list(_gradient.signatures) == before
+
+
+def test_loops_are_compiled_without_torch():
+    code = "from agents.learning.fit import compile_fit; from agents.learning.ppo.gradient import compile_loops; "
+    code += "compile_fit(); compile_loops(); import sys; print('torch' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout == "False\n"

@@ -9,7 +9,9 @@ import stable_baselines3
 import torch
 
 from agents.learning.flat_adam import FlatAdam
+from agents.learning.passes import outputs_of
 from agents.learning.ppo.agent import PPO
+from agents.learning.ppo.gradient import compile_loops, gradient_of
 from elbow_gym.sb3 import SB3VecEnv
 from elbow_gym.vector_env import ElbowArmVectorEnv
 
@@ -180,6 +182,13 @@ def test_rollout_holds_what_stable_baselines3_would_have_stored(env):
         values, log_probs, _ = model.policy.evaluate_actions(*flat)
     np.testing.assert_allclose(buffer.values.ravel(), values.ravel(), rtol=1e-5, atol=1e-6)
     np.testing.assert_allclose(buffer.log_probs.ravel(), log_probs, rtol=1e-5, atol=1e-5)
+
+
+def test_training_compiles_nothing_after_its_loops(env):
+    compile_loops()
+    before = list(gradient_of.signatures), list(outputs_of.signatures)
+    small(PPO, env).learn(STEPS * ARMS)
+    assert (list(gradient_of.signatures), list(outputs_of.signatures)) == before
 
 
 def test_a_callback_ends_the_rollout(env):
