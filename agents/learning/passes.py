@@ -182,4 +182,8 @@ def outputs_of(x: Array, parameters: Array, places: Integers, kind: int, room: R
     """Puts the outputs of a network for S inputs into `found`, shape (S, outputs); the others as of `forward`."""
     transpose(parameters, places, room)
     for first in range(0, len(x), ROWS):
-        found[first : first + ROWS] = forward(x[first : first + ROWS], parameters, places, kind, room)
+        value = forward(x[first : first + ROWS], parameters, places, kind, room)
+        # An assignment of slices would take two seconds to compile, for the text of its error.
+        for r in range(len(value)):
+            for i in range(value.shape[1]):
+                found[first + r, i] = value[r, i]
