@@ -6,7 +6,7 @@ import contextlib
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any, TextIO
@@ -48,7 +48,7 @@ class _WithoutNotice:
 
 
 def compile_before(
-    batches: Iterable[Settings | tuple[Settings, int]], others: Sequence[Callable[[], Any]] = ()
+    batches: Iterable[Settings | tuple[Settings, int]], others: Mapping[Callable[[], Any], int] | None = None
 ) -> None:
     """Compiles the kernels that environments will need, here and one after the other, before processes start.
 
@@ -58,7 +58,7 @@ def compile_before(
     Args:
         batches: settings of the environments, each alone or with the number of arms side by side; alone they mean
             a batch. Up to two arms have another kernel than more.
-        others: calls that compile further kernels, one each.
+        others: calls that compile something else, and about how long each takes [s].
     """
     import numpy as np
 
@@ -71,7 +71,8 @@ def compile_before(
         if alike not in wanted:
             wanted.append(alike)
     kernels = {(settings.table is False, arms <= 2) for settings, arms in wanted}
-    seconds = COMPILE_SECONDS * (len(kernels) + len(others))
+    others = others or {}
+    seconds = COMPILE_SECONDS * len(kernels) + sum(others.values())
     notice = f"Compiling the kernel for this machine, once: about {seconds} s of CPU time."
     said = threading.Event()
 

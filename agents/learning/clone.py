@@ -137,6 +137,9 @@ def clone_all(
         ValueError: there is no such trajectory, or a folder holds a run already and `resume` is not set or it had
             other settings.
     """
+    from agents.learning.compiled import COMPILE_SECONDS
+    from agents.learning.fit import compile_fit
+
     if not trajectory.is_file():
         raise ValueError(f"trajectory must be a file that `python -m benchmarks optimal` wrote, got no {trajectory}")
     work = partial(_clone_one, settings, trajectory.absolute(), how, command)
@@ -144,7 +147,8 @@ def clone_all(
         seed: RoundsRun(folder=folder, record=_record(settings, trajectory, how, seed), work=work, rounds=how.rounds)
         for seed, folder in zip(seeds, folders, strict=True)
     }
-    return train_by_rounds(runs, settings, "clone", "stopped; --resume starts it anew", resume, machines)
+    others = {compile_fit: COMPILE_SECONDS}
+    return train_by_rounds(runs, settings, "clone", "stopped; --resume starts it anew", resume, machines, others)
 
 
 def _record(settings: Settings, trajectory: Path, how: CloneSettings, seed: int) -> dict[str, Any]:

@@ -12,6 +12,8 @@ from numba import njit
 from elbow_gym.kernel.disk_cache import stored
 from elbow_gym.kernel.template import renamed
 
+COMPILE_SECONDS = 4
+"""Approximate time that the loops of one learner take to compile [s]."""
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "fastmath": {"contract"}}
 
 

@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from agents.learning.compiled import entry
-
-Array = NDArray[np.float32]
+from agents.learning.passes import Array
 
 LINE = 16
 """Number of parameters in a line of the cache."""

@@ -1,9 +1,9 @@
-"""Compiled passes through actor and critic.
+"""Compiled passes through small networks.
 
 A batch goes through a network in blocks of `ROWS` samples, whose values stay in the processor's nearest caches. Torch
 takes as long to call the operations of such small networks as the matrices' products take.
 
-The parameters of both networks lie in one array. A network's `places` tell where: a row for each layer with the
+The parameters of several networks lie in one array. A network's `places` tell where: a row for each layer with the
 positions of its weights and biases in that array, and its numbers of inputs and outputs.
 """
 

@@ -40,6 +40,7 @@ def train_by_rounds(
     stopped: str,
     resume: bool = False,
     machines: Machines | None = None,
+    others: Mapping[Callable[[], Any], int] | None = None,
 ) -> dict[int, dict[str, Any]]:
     """Trains several seeds side by side, in processes unless machines are given; the results by seed.
 
@@ -52,6 +53,7 @@ def train_by_rounds(
         stopped: what a line says of a run that Ctrl-C has stopped.
         resume: whether runs that are there go on.
         machines: where they are trained.
+        others: calls that compile what else the seeds need, and about how long each takes [s].
 
     Raises:
         ValueError: a folder holds a run already and `resume` is not set or it had other settings.
@@ -71,7 +73,7 @@ def train_by_rounds(
     if jobs:
         for seed in jobs:
             check_writable(runs[seed].folder)
-        compile_before([settings])
+        compile_before([settings], others)
         try:
             with tqdm(total=sum(job.size for job in jobs.values()), unit="round", desc=what) as bar:
                 results.update(do_all(jobs, bar.update, machines))

@@ -181,7 +181,7 @@ def train_all(runs: Sequence[Run], machines: Machines | None = None, resume: boo
         run.files.check(run.record(), resume)
     for run in runs:
         check_writable(run.folder)
-    compile_before(batches(runs), _compilations(runs))
+    compile_before(batches(runs), compilations(runs))
     apart = machines.ray is not None or min(machines.workers or cores(), len(runs)) > 1
     with Bar(sum(run.settings.total_timesteps for run in runs), "step") as bar:
         outcomes = _side_by_side(runs, machines, bar) if apart else _one_by_one(runs, resume, bar)
@@ -195,13 +195,14 @@ def train_all(runs: Sequence[Run], machines: Machines | None = None, resume: boo
     return outcomes
 
 
-def _compilations(runs: Sequence[Run]) -> list[Callable[[], None]]:
-    """Calls that compile what the learning itself needs, for `compile_before`."""
+def compilations(runs: Sequence[Run]) -> dict[Callable[[], None], int]:
+    """Calls that compile what the learning itself needs and their seconds, for `compile_before`."""
+    from agents.learning.compiled import COMPILE_SECONDS
     from agents.learning.fit import compile_fit
     from agents.learning.ppo.gradient import compile_loops
 
     needed = {"ppo": compile_loops, "sac": compile_fit}
-    return [needed[name] for name in dict.fromkeys(run.algorithm for run in runs) if name in needed]
+    return {needed[run.algorithm]: COMPILE_SECONDS for run in runs if run.algorithm in needed}
 
 
 def batches(runs: Sequence[Run]) -> list[tuple[Settings, int] | Settings]:

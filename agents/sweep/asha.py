@@ -21,7 +21,7 @@ from agents.jobs.bar import Bar, say
 from agents.jobs.cluster import connection
 from agents.jobs.machines import HERE, Machines
 from agents.learning.run import Run
-from agents.learning.train import batches, train
+from agents.learning.train import batches, compilations, train
 from agents.sweep.results import Trials
 from agents.workers import compile_before, cores
 
@@ -49,7 +49,7 @@ def run_trials(trials: Trials, folder: Path, machines: Machines, resume: bool) -
         run.files.check(run.record(), resume)
     for run in runs:
         check_writable(run.folder)
-    compile_before(batches(runs))
+    compile_before(batches(runs), compilations(runs))
     os.environ["TUNE_DISABLE_SIGINT_HANDLER"] = "1"
     tasks: dict[Any, list[Sequence[Run]]] = {}
     for trial, group in trials.values():

@@ -14,7 +14,7 @@ from typing import Any
 
 from agents.files import write_csv, write_text, write_whole
 from agents.machine import machine, versions
-from agents.workers import compile_before, cores
+from agents.workers import COMPILE_SECONDS, compile_before, cores
 from benchmarks.blocks import publish_blocks
 from benchmarks.machine import LATEST_SPEED, PACKAGES, RESULTS
 from benchmarks.speed import markdown
@@ -163,7 +163,7 @@ def speed(output: Path = LATEST_SPEED, quick: bool = False, publish: bool = Fals
     from tqdm import tqdm
 
     started, load = time.monotonic(), os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-    compile_before([(Settings(), 1), Settings()], compilations())
+    compile_before([(Settings(), 1), Settings()], dict.fromkeys(compilations(), COMPILE_SECONDS))
     differences = check_agreement()
     chosen, seconds = contenders(quick), {trial: trial.contender() for trial in trials(quick)}
     rounds, every = QUICK_ROUNDS if quick else ROUNDS, [*chosen, *seconds.values()]

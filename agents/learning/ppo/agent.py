@@ -38,7 +38,7 @@ class PPO(stable_baselines3.PPO):
     rollout_buffer: Any
 
     @property
-    def _written_down(self) -> bool:
+    def _covered(self) -> bool:
         policy = self.policy
         if self.use_sde or self.clip_range_vf is not None or type(policy) is not ActorCriticPolicy:
             return False
@@ -60,7 +60,7 @@ class PPO(stable_baselines3.PPO):
             rollout_buffer: buffer of `n_rollout_steps` control periods of each arm.
             n_rollout_steps: number of control periods.
         """
-        if not self._written_down:
+        if not self._covered:
             return super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps)
         buffer = rollout_buffer
         self.policy.set_training_mode(False)
@@ -106,7 +106,7 @@ class PPO(stable_baselines3.PPO):
 
     def train(self) -> None:
         """Makes the gradient steps of an update from the rollout buffer."""
-        if not self._written_down:
+        if not self._covered:
             super().train()
             return
         policy = self.policy

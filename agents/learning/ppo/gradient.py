@@ -123,7 +123,7 @@ def _surrogate(
         ratio = math.exp(log_ratio)
         advantage = (samples.advantage[sample] - normal[0]) * normal[1]
         free, held = advantage * ratio, advantage * min(max(ratio, _ONE - clip), _ONE + clip)
-        # NaN is less than nothing: it has to reach the actor, which would stand still without a word.
+        # A NaN compares false: in this order it reaches the actor, which otherwise would stand still without a word.
         slope = _ZERO if free > held else -free
         for j in range(len(log_std)):
             departure = back[r, j]

@@ -29,7 +29,7 @@ from agents.jobs.bar import Bar
 from agents.jobs.job import Job, perform
 from agents.jobs.machines import Machines
 from agents.learning.callback import Keeper
-from agents.learning.checkpoint import running
+from agents.learning.checkpoint import check_versions, running
 from agents.learning.evaluation import COLUMNS
 from agents.learning.run_folder import RunFolder
 from agents.learning.train import train, train_all
@@ -412,6 +412,11 @@ def test_checkpoint_of_other_versions_is_refused_naming_both(done, tmp_path, mon
         )
         with pytest.raises(ValueError, match=message):
             train(run, resume=True)
+
+
+def test_checkpoint_that_does_not_say_a_version_goes_on(done, monkeypatch):
+    monkeypatch.setattr("agents.learning.checkpoint.running", lambda: {"a package of tomorrow": "1.0"})
+    check_versions(done[0].files.checkpoint())
 
 
 @pytest.mark.parametrize("name", ["model.zip", "state.pkl", "progress.json"])

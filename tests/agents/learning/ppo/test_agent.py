@@ -75,7 +75,7 @@ def test_update_is_that_of_stable_baselines3(env, monkeypatch, activation, argum
     own, theirs = (small(kind, env, activation, ent_coef=0.01, **arguments) for kind in (PPO, stable_baselines3.PPO))
     torch.testing.assert_close(vector(own), vector(theirs), rtol=0.0, atol=0.0)
     before = vector(own)
-    if own._written_down:
+    if own._covered:
         same_order(monkeypatch, 3)
     for model in (own, theirs):
         buffer = model.rollout_buffer
