@@ -73,10 +73,10 @@ def test_steps_of_a_fit_are_those_of_torch(activation, squashed):
 
 
 def test_a_fit_compiles_nothing_after_its_loops():
+    """Whatever is called has the same types: there is one compiled form."""
     compile_fit()
-    before = list(_gradient.signatures)
     Fit(network(nn.Tanh, 3, 2)).step(np.arange(4), np.ones((4, 3), np.float32), np.ones((4, 2), np.float32), 0.1)
-    assert list(_gradient.signatures) == before
+    assert len(_gradient.signatures) == 1
 
 
 def test_what_compiles_the_loops_needs_no_torch():

@@ -185,10 +185,10 @@ def test_rollout_holds_what_stable_baselines3_would_have_stored(env):
 
 
 def test_training_compiles_nothing_after_its_loops(env):
+    """Whatever is called has the same types: there is one compiled form of each."""
     compile_loops()
-    before = list(gradient_of.signatures), list(outputs_of.signatures)
     small(PPO, env).learn(STEPS * ARMS)
-    assert (list(gradient_of.signatures), list(outputs_of.signatures)) == before
+    assert (len(gradient_of.signatures), len(outputs_of.signatures)) == (1, 1)
 
 
 def test_a_callback_ends_the_rollout(env):
